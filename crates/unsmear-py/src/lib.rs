@@ -1,0 +1,22 @@
+//! The private module `unsmear._unsmear`: converts, calls the core, wraps. The API is the Python package around it.
+#![forbid(unsafe_code)]
+
+use pyo3::prelude::*;
+
+mod errors;
+mod threads;
+
+/// Private core of `unsmear`; import the package instead.
+#[pymodule]
+mod _unsmear {
+    #[pymodule_export]
+    use crate::threads::{get_num_threads, set_num_threads};
+
+    use super::{Bound, PyModule, PyModuleMethods, PyResult};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("optimized", !cfg!(debug_assertions))
+    }
+}

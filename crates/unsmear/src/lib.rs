@@ -1,0 +1,26 @@
+//! Phase-based optical flow and pixel-by-pixel removal of motion blur.
+//!
+//! The modules in pipeline order; each uses only those above it.
+//!
+//! | module | concept |
+//! |---|---|
+//! | [`error`], [`real`], [`border`], [`control`] | failures, scalars, picture edges, cancellation |
+//! | [`flow_field`] | a field of motion |
+//!
+//! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
+//! frequencies in cycles/px in parameters and rad/px inside.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod array;
+pub mod border;
+pub mod control;
+pub mod error;
+pub mod flow_field;
+pub mod real;
+
+pub use border::Border;
+pub use control::Control;
+pub use error::{Error, Result};
+pub use flow_field::{FlowField, FlowView};
+pub use real::Real;
