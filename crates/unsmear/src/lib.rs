@@ -9,18 +9,26 @@
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![warn(missing_docs)]
 
 mod array;
 pub mod border;
 pub mod control;
+pub mod convolve;
 pub mod error;
+pub mod fft_convolve;
+pub mod flow;
 pub mod flow_field;
+pub mod fourier;
+pub mod gabor;
+pub mod metrics;
+pub mod phase_gradient;
 pub mod real;
 
 pub use border::Border;
 pub use control::Control;
+pub use convolve::{correlate_axis, correlate_separable, gaussian_taps};
 pub use error::{Error, Result};
 pub use flow_field::{FlowField, FlowView};
 pub use real::Real;

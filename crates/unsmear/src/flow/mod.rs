@@ -1,0 +1,3 @@
+//! Optical flow: one method per module.
+
+pub mod thesis;

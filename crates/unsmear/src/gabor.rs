@@ -1,0 +1,417 @@
+//! A bank of quadrature Gabor filters over orientation, and its responses to one picture.
+//!
+//! With `k0 = 2 pi f0` rad/px and a bandwidth of `beta` octaves (measured at one deviation of the
+//! filter's Gaussian spectrum), filter `j` of `N` is
+//!
+//! ```text
+//! sigma = (2^beta + 1) / ((2^beta - 1) k0)                               px
+//! k_j   = k0 (cos theta_j, sin theta_j),   theta_j = j pi / N            x right, y down
+//! g_j(x, y) = exp(i k_j . (x, y)) exp(-(x^2 + y^2) / (2 sigma^2)) / sum
+//! ```
+//!
+//! and its response the convolution `R_j = g_j * I`, whose phase advances by `+k_j` per pixel on a
+//! pattern tuned to it. The half circle of orientations is complete: the other half holds complex
+//! conjugates. A flat region must answer with nothing, so the filters are freed of their response
+//! to a constant: in the one-dimensional factor along the larger component of `k_j`, the even taps
+//! become `c - g sum(c)`.
+//!
+//! Differs from the founding method (see [`crate::flow::thesis`]), whose deviation lacks a factor
+//! 2 pi, whose filters leak the mean and which covers the circle twice.
+//!
+//! The separable factors of mirrored orientations `theta` and `pi - theta` are shared: with
+//! `A + iB` the picture filtered along x and `C + iS` the taps along y,
+//! `R = (AC - BS) + i (AS + BC)` and its mirror `(AC + BS) + i (AS - BC)`.
+//!
+//! Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), section 3 and appendix A.
+
+use std::f64::consts::{PI, TAU};
+
+use ndarray::ArrayView2;
+
+use crate::array::{for_each_row, for_each_row_with};
+use crate::border::Border;
+use crate::control::Control;
+use crate::convolve::{even_odd_sums, gaussian_taps, pad_row};
+use crate::error::{Result, require};
+use crate::real::Real;
+
+/// What a bank is tuned to; see the [module](self).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaborParameters {
+    /// `f0`, cycles/px, in (0, 0.5). Default 0.15: a wavelength of 6.7 px.
+    pub tuning_frequency: f64,
+    /// `beta`, octaves, in (0, 3]. Default 0.8, Fleet & Jepson's.
+    pub bandwidth_octaves: f64,
+    /// `N`, filters over 180 degrees, at least 2. Default 6: neighbours cross at half power.
+    pub orientations: usize,
+    /// Where the taps end, in deviations. Default 3: what is cut off weighs 0.3 %.
+    pub support: f64,
+}
+
+impl Default for GaborParameters {
+    fn default() -> Self {
+        Self { tuning_frequency: 0.15, bandwidth_octaves: 0.8, orientations: 6, support: 3.0 }
+    }
+}
+
+impl GaborParameters {
+    /// `k0`, rad/px: the one place where cycles become radians.
+    #[must_use]
+    pub fn wavenumber(&self) -> f64 {
+        TAU * self.tuning_frequency
+    }
+
+    /// Deviation of the Gaussian window, px.
+    #[must_use]
+    pub fn sigma(&self) -> f64 {
+        let ratio = self.bandwidth_octaves.exp2();
+        (ratio + 1.0) / ((ratio - 1.0) * self.wavenumber())
+    }
+
+    fn check(&self) -> Result<()> {
+        require("tuning_frequency", self.tuning_frequency, "in (0, 0.5) cycles/px", |f| {
+            f > 0.0 && f < 0.5
+        })?;
+        let octaves = self.bandwidth_octaves;
+        require("bandwidth_octaves", octaves, "in (0, 3]", |b| b > 0.0 && b <= 3.0)?;
+        require("orientations", self.orientations as f64, "in 2..=64", |n| {
+            (2.0..=64.0).contains(&n)
+        })?;
+        require("support", self.support, "in [1, 6] deviations", |s| (1.0..=6.0).contains(&s))
+    }
+}
+
+/// Planned filters; see the [module](self). Build once, run on many pictures.
+#[derive(Debug, Clone)]
+pub struct GaborBank<T> {
+    sigma: f64,
+    radius: usize,
+    wavevectors: Vec<[f64; 2]>,
+    /// Taps along x, one set for each distinct `|k_x|`.
+    along_x: Vec<EvenOdd<T>>,
+    pairs: Vec<MirrorPair<T>>,
+}
+
+/// Even and odd taps `0..=radius` of one complex factor; the odd ones are absent for `k = 0`.
+#[derive(Debug, Clone)]
+struct EvenOdd<T> {
+    even: Vec<T>,
+    odd: Vec<T>,
+    real: bool,
+}
+
+/// The filters at `(k_x, k_y)` and, unless it lies on an axis, at `(-k_x, k_y)`.
+#[derive(Debug, Clone)]
+struct MirrorPair<T> {
+    along_x: usize,
+    along_y: EvenOdd<T>,
+    filter: usize,
+    mirror: Option<usize>,
+}
+
+impl<T: Real> EvenOdd<T> {
+    /// Correlation taps of `g exp(i k x)`: the odd part changes sign against convolution's.
+    fn new(gaussian: &[f64], k: f64, free_of_mean: bool) -> Self {
+        let radius = gaussian.len() / 2;
+        let half = &gaussian[radius..];
+        let mut even: Vec<f64> =
+            half.iter().enumerate().map(|(j, g)| g * (k * j as f64).cos()).collect();
+        if free_of_mean {
+            let sum = even[0] + 2.0 * even[1..].iter().sum::<f64>();
+            even.iter_mut().zip(half).for_each(|(c, g)| *c -= g * sum);
+        }
+        let odd = half.iter().enumerate().map(|(j, g)| T::of(-g * (k * j as f64).sin())).collect();
+        Self { even: even.into_iter().map(T::of).collect(), odd, real: k == 0.0 }
+    }
+}
+
+impl<T: Real> GaborBank<T> {
+    /// Plans the filters.
+    ///
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) when a parameter is outside its documented range.
+    pub fn new(parameters: &GaborParameters) -> Result<Self> {
+        parameters.check()?;
+        let (n, k0, sigma) = (parameters.orientations, parameters.wavenumber(), parameters.sigma());
+        let radius = (parameters.support * sigma).ceil() as usize;
+        let gaussian = gaussian_taps(sigma, radius);
+        let wavevectors: Vec<[f64; 2]> = (0..n).map(|j| wavevector(k0, j, n)).collect();
+        let mut bank = Self { sigma, radius, wavevectors, along_x: Vec::new(), pairs: Vec::new() };
+        for filter in 0..=n / 2 {
+            let [kx, ky] = bank.wavevectors[filter];
+            let x_carries = kx.abs() >= ky.abs();
+            bank.pairs.push(MirrorPair {
+                along_x: bank.along_x.len(),
+                along_y: EvenOdd::new(&gaussian, ky, !x_carries),
+                filter,
+                mirror: (filter > 0 && 2 * filter < n).then(|| n - filter),
+            });
+            bank.along_x.push(EvenOdd::new(&gaussian, kx, x_carries));
+        }
+        Ok(bank)
+    }
+
+    /// Deviation of the Gaussian window, px; its inverse is that of the spectrum, rad/px.
+    #[must_use]
+    pub fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    /// Farthest sample that takes part in a response, px: the halo of the bank.
+    #[must_use]
+    pub fn radius(&self) -> usize {
+        self.radius
+    }
+
+    /// `(k_x, k_y)` of each filter, rad/px.
+    #[must_use]
+    pub fn wavevectors(&self) -> &[[f64; 2]] {
+        &self.wavevectors
+    }
+
+    /// Responses of all filters to a picture (H, W).
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn respond(
+        &self,
+        picture: ArrayView2<'_, T>,
+        border: Border,
+        control: &Control,
+    ) -> Result<Responses<T>> {
+        let (height, width) = picture.dim();
+        let mut responses = Responses::zeros(self.wavevectors.len(), height, width);
+        if picture.is_empty() {
+            return Ok(responses);
+        }
+        let filtered = self.filter_rows(picture, border, control)?;
+        let planes = 2 * self.wavevectors.len();
+        for_each_row_with(
+            &mut responses.data,
+            planes * width,
+            control,
+            || vec![T::zero(); 4 * width],
+            |y, out, scratch| {
+                for pair in &self.pairs {
+                    self.filter_column(pair, &filtered, [y, height, width], border, scratch, out);
+                }
+            },
+        )?;
+        Ok(responses)
+    }
+
+    /// The picture filtered along x: per row, an even and an odd line for each set of taps.
+    fn filter_rows(
+        &self,
+        picture: ArrayView2<'_, T>,
+        border: Border,
+        control: &Control,
+    ) -> Result<Vec<T>> {
+        let picture = picture.as_standard_layout();
+        let (height, width) = picture.dim();
+        let packed = picture.as_slice().unwrap_or_default();
+        let lines = 2 * self.along_x.len();
+        let mut filtered = vec![T::zero(); height * lines * width];
+        for_each_row(&mut filtered, lines * width, control, |y, out| {
+            let mut padded = vec![T::zero(); width + 2 * self.radius];
+            pad_row(&packed[y * width..(y + 1) * width], self.radius, border, &mut padded);
+            let shifted: Vec<&[T]> = (0..=2 * self.radius).map(|j| &padded[j..j + width]).collect();
+            for (taps, out) in self.along_x.iter().zip(out.chunks_mut(2 * width)) {
+                let (even, odd) = out.split_at_mut(width);
+                even_odd_sums(&shifted, &taps.even, &taps.odd, even, odd);
+            }
+        })?;
+        Ok(filtered)
+    }
+
+    /// One row of the responses of a pair of mirrored filters.
+    fn filter_column(
+        &self,
+        pair: &MirrorPair<T>,
+        filtered: &[T],
+        [y, height, width]: [usize; 3],
+        border: Border,
+        scratch: &mut [T],
+        out: &mut [T],
+    ) {
+        let stride = 2 * self.along_x.len() * width;
+        let zeros = vec![T::zero(); width];
+        let line = |j: usize, part: usize| {
+            border.index((y + j) as isize - self.radius as isize, height).map_or(
+                zeros.as_slice(),
+                |row| {
+                    let start = row * stride + (2 * pair.along_x + part) * width;
+                    &filtered[start..start + width]
+                },
+            )
+        };
+        let lines = |part| (0..=2 * self.radius).map(|j| line(j, part)).collect::<Vec<&[T]>>();
+        let (first, second) = scratch.split_at_mut(2 * width);
+        let (ac, sa) = first.split_at_mut(width);
+        let (bc, sb) = second.split_at_mut(width);
+        let taps = &pair.along_y;
+        even_odd_sums(&lines(0), &taps.even, &taps.odd, ac, sa);
+        if self.along_x[pair.along_x].real {
+            bc.fill(T::zero());
+            sb.fill(T::zero());
+        } else {
+            even_odd_sums(&lines(1), &taps.even, &taps.odd, bc, sb);
+        }
+        let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
+        let (re, im) = out[plane(pair.filter)].split_at_mut(width);
+        for x in 0..width {
+            re[x] = ac[x] - sb[x];
+            im[x] = sa[x] + bc[x];
+        }
+        if let Some(mirror) = pair.mirror {
+            let (re, im) = out[plane(mirror)].split_at_mut(width);
+            for x in 0..width {
+                re[x] = ac[x] + sb[x];
+                im[x] = sa[x] - bc[x];
+            }
+        }
+    }
+}
+
+/// `k_j`; exact on the axes and exactly mirrored about them, as the shared passes assume.
+fn wavevector(k0: f64, j: usize, n: usize) -> [f64; 2] {
+    if 2 * j == n {
+        return [0.0, k0];
+    }
+    if 2 * j > n {
+        let [kx, ky] = wavevector(k0, n - j, n);
+        return [-kx, ky];
+    }
+    let theta = PI * j as f64 / n as f64;
+    [k0 * theta.cos(), k0 * theta.sin()]
+}
+
+/// Complex responses of `N` filters to a picture (H, W), the rows of all filters side by side so
+/// that a row of work touches one stretch of memory.
+#[derive(Debug, Clone)]
+pub struct Responses<T> {
+    data: Vec<T>,
+    filters: usize,
+    height: usize,
+    width: usize,
+}
+
+impl<T: Real> Responses<T> {
+    /// All responses 0.
+    #[must_use]
+    pub fn zeros(filters: usize, height: usize, width: usize) -> Self {
+        Self { data: vec![T::zero(); 2 * filters * height * width], filters, height, width }
+    }
+
+    /// (N, H, W).
+    #[must_use]
+    pub fn dim(&self) -> (usize, usize, usize) {
+        (self.filters, self.height, self.width)
+    }
+
+    /// Real and imaginary parts of row `y` of filter `filter`.
+    #[inline]
+    #[must_use]
+    pub fn row(&self, filter: usize, y: usize) -> (&[T], &[T]) {
+        let start = (y * self.filters + filter) * 2 * self.width;
+        self.data[start..start + 2 * self.width].split_at(self.width)
+    }
+
+    /// Like [`Responses::row`], to write.
+    #[inline]
+    #[must_use]
+    pub fn row_mut(&mut self, filter: usize, y: usize) -> (&mut [T], &mut [T]) {
+        let start = (y * self.filters + filter) * 2 * self.width;
+        self.data[start..start + 2 * self.width].split_at_mut(self.width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    fn bank(orientations: usize) -> GaborBank<f64> {
+        GaborBank::new(&GaborParameters { orientations, ..Default::default() }).unwrap()
+    }
+
+    fn respond(bank: &GaborBank<f64>, picture: &Array2<f64>) -> Responses<f64> {
+        bank.respond(picture.view(), Border::Replicate, &Control::new()).unwrap()
+    }
+
+    /// A cosine along `k` answers its own filter with half its amplitude times exp(i k x), but for
+    /// the 0.3 % beyond the support and the leak of the conjugate, exp(-(2 k0 sigma)^2 / 2).
+    #[test]
+    fn phase_of_a_plane_wave_advances_along_its_wavevector() {
+        let bank = bank(6);
+        for (filter, &[kx, ky]) in bank.wavevectors().iter().enumerate() {
+            let wave = |y: usize, x: usize| kx * x as f64 + ky * y as f64;
+            let picture = Array2::from_shape_fn((40, 44), |(y, x)| wave(y, x).cos());
+            let responses = respond(&bank, &picture);
+            let (re, im) = responses.row(filter, 20);
+            let phase = wave(20, 21);
+            assert!((re[21] - 0.5 * phase.cos()).abs() < 3e-3, "filter {filter}");
+            assert!((im[21] - 0.5 * phase.sin()).abs() < 3e-3, "filter {filter}");
+        }
+    }
+
+    #[test]
+    fn a_flat_picture_answers_with_nothing() {
+        for orientations in [2, 3, 4, 5, 6] {
+            let bank = bank(orientations);
+            let responses = respond(&bank, &Array2::from_elem((30, 31), 255.0));
+            // 25 taps of order 0.1 on 255: rounding is below 1e-12.
+            assert!(responses.data.iter().all(|r| r.abs() < 1e-11));
+        }
+    }
+
+    #[test]
+    fn shared_passes_equal_the_direct_sum() {
+        let picture = Array2::from_shape_fn((9, 37), |(y, x)| ((x * y) as f64 * 0.37).sin());
+        for orientations in [2, 3, 5, 6] {
+            let parameters = GaborParameters {
+                tuning_frequency: 0.2,
+                bandwidth_octaves: 1.5,
+                orientations,
+                support: 2.5,
+            };
+            let bank = GaborBank::<f64>::new(&parameters).unwrap();
+            let responses = respond(&bank, &picture);
+            let r = bank.radius() as isize;
+            let g = gaussian_taps(parameters.sigma(), bank.radius());
+            for (filter, &[kx, ky]) in bank.wavevectors().iter().enumerate() {
+                let factor = |k: f64, carries: bool, j: isize| {
+                    let phase = |j: isize| k * j as f64;
+                    let at = |j: isize| g[(j + r) as usize];
+                    let mean: f64 = (-r..=r).map(|j| at(j) * phase(j).cos()).sum();
+                    let even = phase(j).cos() - if carries { mean } else { 0.0 };
+                    [at(j) * even, -at(j) * phase(j).sin()]
+                };
+                for (y, x) in [(0, 0), (4, 18), (8, 36), (2, 30)] {
+                    let mut sum = [0.0; 2];
+                    for (j, i) in (-r..=r).flat_map(|j| (-r..=r).map(move |i| (j, i))) {
+                        let x_carries = kx.abs() >= ky.abs();
+                        let [a, b] = factor(kx, x_carries, i);
+                        let [c, s] = factor(ky, !x_carries, j);
+                        let sample = picture[(
+                            Border::Replicate.index(y as isize + j, 9).unwrap(),
+                            Border::Replicate.index(x as isize + i, 37).unwrap(),
+                        )];
+                        sum[0] += sample * (a * c - b * s);
+                        sum[1] += sample * (a * s + b * c);
+                    }
+                    let (re, im) = responses.row(filter, y);
+                    assert!((re[x] - sum[0]).abs() < 1e-13 && (im[x] - sum[1]).abs() < 1e-13);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_outside_their_range_are_named() {
+        let bad = GaborParameters { tuning_frequency: 0.5, ..Default::default() };
+        let error = GaborBank::<f32>::new(&bad).unwrap_err().to_string();
+        assert_eq!(error, "tuning_frequency must be in (0, 0.5) cycles/px, got 0.5");
+        assert!(GaborBank::<f32>::new(&GaborParameters { orientations: 1, ..bad }).is_err());
+    }
+}
