@@ -10,10 +10,10 @@
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
 #![deny(unsafe_code)]
-#![warn(missing_docs)]
 
 mod array;
 pub mod border;
+pub mod component_velocity;
 pub mod control;
 pub mod convolve;
 pub mod error;
@@ -25,6 +25,7 @@ pub mod gabor;
 pub mod metrics;
 pub mod phase_gradient;
 pub mod real;
+pub mod spatiotemporal;
 
 pub use border::Border;
 pub use control::Control;
