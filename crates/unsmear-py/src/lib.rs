@@ -3,12 +3,18 @@
 
 use pyo3::prelude::*;
 
+mod deblur;
 mod errors;
+mod psf;
 mod threads;
 
 /// Private core of `unsmear`; import the package instead.
 #[pymodule]
 mod _unsmear {
+    #[pymodule_export]
+    use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
+    #[pymodule_export]
+    use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]
     use crate::threads::{get_num_threads, set_num_threads};
 
