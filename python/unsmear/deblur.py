@@ -37,9 +37,8 @@ class DeblurResult:
     report : dict
         Plain data (JSON-able): ``method``, ``exposure`` (frames), ``noise`` (standard
         deviation in the units of the input, None if not used), ``regularization``
-        (with ``regularization_kind``, "constant": r against the power of the blur;
-        "noise-to-detail": sigma^2 / c in (rad/px)^2), ``reach`` (px), counts of copied
-        pixels (``unknown_pixels``, ``still_pixels``, ``too_long_pixels``), ``pixels``,
+        (the constant r, None if it followed noise and detail), ``reach`` (px), counts
+        of copied pixels (``unknown_pixels``, ``still_pixels``, ``too_long_pixels``), ``pixels``,
         ``degree`` (method "thesis"), ``version``, ``warnings`` (list of str).
     """
 
@@ -83,7 +82,7 @@ def deblur(
     regularization : float, optional
         r > 0, constant over frequency, against the power :math:`|K|^2 \le 1` of the
         blur; then ``noise`` is not used. Default: from the noise and the strength of
-        the picture's detail ("wiener"), 0.02 as in the founding work ("thesis").
+        the detail around each pixel ("wiener"), 0.02 as in the founding work ("thesis").
     degree : int, default 4
         Interpolation degree 1 to 4 of "thesis"; unused otherwise.
     channel_axis : int, optional
@@ -165,18 +164,20 @@ def _wiener(
     progress: Progress,
 ) -> tuple[NDArray[Any], dict[str, Any]]:
     single = channels.array.itemsize == 4
+    if regularization is not None:
+        regularization = float(regularization)
     planes, report = (_unsmear.wiener_f32 if single else _unsmear.wiener_f64)(
         channels.array,
         channels.flow(flow),
         float(exposure),
         None if noise is None else float(noise) / channels.scale,
-        None if regularization is None else float(regularization),
+        regularization,
         progress,
     )
-    constant = regularization is not None
     # From here on in the units of the picture that came.
-    report["noise"] = None if constant else report["noise"] * channels.scale
-    report["regularization_kind"] = "constant" if constant else "noise-to-detail"
+    automatic = regularization is None
+    report["noise"] = report["noise"] * channels.scale if automatic else None
+    report["regularization"] = None if automatic else regularization
     return planes, report
 
 
@@ -203,7 +204,6 @@ def _thesis(
     report = {
         "noise": None,
         "regularization": regularization,
-        "regularization_kind": "constant",
         "degree": int(degree),
         "unknown_pixels": unknown,
     }

@@ -83,7 +83,6 @@ fn wiener_channels<'py, T: Real + Element>(
     })?;
     let report = PyDict::new(py);
     report.set_item("noise", result.noise)?;
-    report.set_item("regularization", result.regularization)?;
     report.set_item("reach", result.reach)?;
     report.set_item("unknown_pixels", result.unknown)?;
     report.set_item("still_pixels", result.still)?;

@@ -79,32 +79,27 @@ fn blur_row<T: Real>(
         if !(length > 0.0 && length.is_finite()) {
             continue;
         }
-        // Steps on either side of the middle, half a pixel each.
-        let steps = length.ceil() as usize;
-        let time = T::of(0.5 * exposure / steps as f64);
-        let (mut inner, mut odd, mut ends) = (T::zero(), T::zero(), T::zero());
+        // Strides of at most a pixel on either side of the middle, each of two intervals.
+        let strides = (0.5 * length).ceil() as usize;
+        let steps = 2 * strides;
+        let time = T::of(0.5 * exposure / strides as f64);
+        let (mut odd, mut even, mut ends) = (T::zero(), *sample, T::zero());
         for direction in [-T::one(), T::one()] {
             let mut walker = lines.start(y, x, motion, speed);
-            for k in 1..=steps {
-                lines.step(&mut walker, direction * time);
-                let [dx, dy] = walker.offset;
+            for k in 1..=strides {
+                lines.stride(&mut walker, direction * time);
+                let ([hx, hy], [dx, dy]) = (walker.halfway, walker.offset);
+                odd += spline.near(y, x, &Position::new(hy, hx));
                 let value = spline.near(y, x, &Position::new(dy, dx));
-                if k == steps {
+                if k == strides {
                     ends += value;
-                } else if (steps - k) % 2 == 1 {
-                    odd += value;
                 } else {
-                    inner += value;
+                    even += value;
                 }
             }
         }
-        if steps % 2 == 1 {
-            odd += *sample;
-        } else {
-            inner += *sample;
-        }
         let weight = T::of(1.0 / (6 * steps) as f64);
-        *sample = weight * (ends + T::of(4.0) * odd + T::of(2.0) * inner);
+        *sample = weight * (ends + T::of(4.0) * odd + T::of(2.0) * even);
     }
 }
 

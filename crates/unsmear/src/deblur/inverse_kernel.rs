@@ -53,6 +53,14 @@ const FLAT_BELOW: f64 = 0.01;
 const LEAST_TRANSFORM: usize = 1024;
 const TRANSFORM_PER_LENGTH: f64 = 16.0;
 
+/// Ratios of noise to detail, (rad/px)^2, between which kernels are made. The least is what interpolation and the
+/// model err by where a picture has no noise; at the greatest, noise drowns detail at 1 rad/px.
+const LEAST_RATIO: f64 = 1e-4;
+const GREATEST_RATIO: f64 = 1.0;
+
+/// Kernels per octave of that ratio: a step changes the gain by less than 0.05 dB.
+const LEVELS_PER_OCTAVE: f64 = 2.0;
+
 /// What the inverse is to be the best for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Regularization {
@@ -62,39 +70,61 @@ pub(super) enum Regularization {
     Constant(f64),
 }
 
-/// Kernels for the lengths that occur; each holds h(0), h(1) .. h(n), and h(-k) = h(k).
+/// Nearest level of a ratio of noise to detail.
+#[inline]
+pub(super) fn level_of(ratio: f64) -> u8 {
+    let octaves = (ratio.clamp(LEAST_RATIO, GREATEST_RATIO) / LEAST_RATIO).log2();
+    (LEVELS_PER_OCTAVE * octaves).round() as u8
+}
+
+/// Number of levels of [`level_of`].
+fn levels() -> usize {
+    usize::from(level_of(GREATEST_RATIO)) + 1
+}
+
+/// Kernels for the lengths and levels that occur; each holds h(0), h(1) .. h(n), and h(-k) = h(k).
 pub(super) struct KernelBank<T> {
     kernels: Vec<Vec<T>>,
+    levels: usize,
 }
 
 impl<T: Real> KernelBank<T> {
-    /// Solves for the kernels of the blur lengths (px) given; others may be missing.
+    /// Solves for the kernels of the (blur length in px, level) given; others may be missing. With a `constant`
+    /// regularisation all levels must be 0.
     pub(super) fn new(
-        lengths: impl Iterator<Item = f64>,
-        regularization: Regularization,
+        needed: impl Iterator<Item = (f64, u8)>,
+        constant: Option<f64>,
         control: &Control,
     ) -> Result<Self> {
+        let levels = if constant.is_some() { 1 } else { levels() };
         let mut wanted = Vec::new();
-        for index in lengths.filter_map(index_of) {
-            if index >= wanted.len() {
-                wanted.resize(index + 1, false);
+        for (length, level) in needed {
+            let Some(index) = index_of(length) else { continue };
+            if (index + 1) * levels > wanted.len() {
+                wanted.resize((index + 1) * levels, false);
             }
-            wanted[index] = true;
+            wanted[index * levels + usize::from(level)] = true;
         }
-        let solve = |(index, &wanted): (usize, &bool)| {
+        let solve = |(place, &wanted): (usize, &bool)| {
             control.check()?;
-            let length = index as f64 * LENGTH_STEP;
-            let kernel = if wanted { inverse_kernel(length, regularization) } else { Vec::new() };
+            if !wanted {
+                return Ok(Vec::new());
+            }
+            let octaves = (place % levels) as f64 / LEVELS_PER_OCTAVE;
+            let natural = Regularization::NoiseToDetail(LEAST_RATIO * octaves.exp2());
+            let regularization = constant.map_or(natural, Regularization::Constant);
+            let kernel = inverse_kernel((place / levels) as f64 * LENGTH_STEP, regularization);
             Ok(kernel.into_iter().map(T::of).collect())
         };
         let kernels = wanted.par_iter().enumerate().map(solve).collect::<Result<_>>()?;
-        Ok(Self { kernels })
+        Ok(Self { kernels, levels })
     }
 
     /// The kernel nearest to a blur length; None where the pixel is to be copied.
     #[inline]
-    pub(super) fn kernel(&self, length: f64) -> Option<&[T]> {
-        index_of(length).and_then(|index| self.kernels.get(index)).map(Vec::as_slice)
+    pub(super) fn kernel(&self, length: f64, level: u8) -> Option<&[T]> {
+        let place = index_of(length)? * self.levels + usize::from(level);
+        self.kernels.get(place).map(Vec::as_slice)
     }
 
     /// Largest number of taps on one side.
@@ -112,7 +142,8 @@ fn index_of(length: f64) -> Option<usize> {
 
 /// The half kernel h(0) .. h(n) for a blur of `length` px.
 pub(super) fn inverse_kernel(length: f64, regularization: Regularization) -> Vec<f64> {
-    let reach = (TAPS_PER_LENGTH * length).ceil() as usize + TAPS_LEAST;
+    // Even, because streamlines are walked in strides of two steps.
+    let reach = 2 * (0.5 * TAPS_PER_LENGTH * length).ceil() as usize + TAPS_LEAST;
     let taps = 2 * reach + 1;
     let n = ((TRANSFORM_PER_LENGTH * length) as usize).max(4 * taps).max(LEAST_TRANSFORM);
     let n = n.next_power_of_two();

@@ -9,8 +9,8 @@
 //! from one frame to the next is that velocity where motion is uniform; in a field that turns by an angle a within a
 //! frame it deviates by a/2 in direction.
 
+mod detail;
 mod inverse_kernel;
-mod prior;
 mod thesis;
 mod wiener;
 

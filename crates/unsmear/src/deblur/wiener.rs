@@ -7,7 +7,7 @@
 //! out(p) = b(p) h_0 + sum_{k=1}^{n} h_k [ b(X_p(k tau)) + b(X_p(-k tau)) ],      tau = 1 / |v(p)| frames
 //! ```
 //!
-//! with h the best finite inverse for L, the noise and the strength of the picture's detail (`inverse_kernel.rs`), and
+//! with h the best finite inverse for L, the noise and the strength of the detail around p (`detail.rs`, `inverse_kernel.rs`), and
 //! b interpolated by the cubic spline of `local_spline.rs`. Colour channels share the walk and the kernel.
 //!
 //! Differs from the founding method: kernels exact, centred, of unit sum, solved for at their finite length; lengths
@@ -20,8 +20,8 @@
 use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2};
 
-use super::inverse_kernel::{COPIED_BLUR, KernelBank, LONGEST_BLUR, Regularization};
-use super::prior::spectrum_constant;
+use super::detail::{DETAIL_REACH, local_detail};
+use super::inverse_kernel::{COPIED_BLUR, KernelBank, LONGEST_BLUR, level_of};
 use crate::array::{for_each_row, require_same};
 use crate::control::Control;
 use crate::error::{Error, Result, require};
@@ -31,8 +31,8 @@ use crate::noise::estimate_noise;
 use crate::real::Real;
 use crate::streamline::Streamlines;
 
-/// Least ratio of noise to detail: what interpolation and the model err by even where the picture has no noise.
-const LEAST_RATIO: f64 = 1e-4;
+/// Level of pixels whose surroundings are not known.
+const UNKNOWN_LEVEL: u8 = u8::MAX;
 
 /// Parameters of the per-pixel Wiener deblurring.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,9 +58,7 @@ pub struct WienerResult<T> {
     pub images: Vec<Array2<T>>,
     /// Noise used, in the picture's units; NaN when a constant regularisation made it needless.
     pub noise: f64,
-    /// Regularisation used: the constant r, or the ratio of noise to detail, in (rad/px)^2.
-    pub regularization: f64,
-    /// Steps walked to either side at most, plus what interpolation reaches, px at the pixel's own speed.
+    /// Steps walked to either side at most, px at the pixel's own speed, plus what is read around each point.
     pub reach: usize,
     /// Pixels copied because their motion is unknown.
     pub unknown: usize,
@@ -84,9 +82,10 @@ impl WienerDeblur {
     ) -> Result<WienerResult<T>> {
         self.validate(images, flow)?;
         let lengths = || flow.u.iter().zip(flow.v.iter()).map(|(&u, &v)| self.blur_length([u, v]));
-        let (noise, regularization) = self.regularization(images, flow, control)?;
-        let bank = KernelBank::new(lengths(), regularization, control)?;
-        let (Regularization::NoiseToDetail(used) | Regularization::Constant(used)) = regularization;
+        let noise = self.noise_used(images, flow, control)?;
+        let levels = self.levels(images, noise, control)?;
+        let known = levels.iter().map(|&level| if level == UNKNOWN_LEVEL { 0 } else { level });
+        let bank = KernelBank::new(lengths().zip(known), self.regularization, control)?;
         let splines =
             images.iter().map(|i| LocalSpline::new(i, control)).collect::<Result<Vec<_>>>()?;
         let lines = Streamlines::new(flow);
@@ -98,7 +97,8 @@ impl WienerDeblur {
         }
         control.expect(height);
         for_each_row(&mut out, width * channels, control, |y, rows| {
-            restore_row(self, &bank, &lines, &splines, y, rows);
+            let levels = &levels[y * width..][..width];
+            restore_row(self, &bank, &lines, &splines, levels, y, rows);
             // A cancelled run is noticed by the helper before its next row.
             let _ = control.advance();
         })?;
@@ -109,8 +109,7 @@ impl WienerDeblur {
         Ok(WienerResult {
             images: (0..channels).map(channel).collect(),
             noise,
-            regularization: used,
-            reach: bank.reach() + VALUE_REACH,
+            reach: bank.reach() + VALUE_REACH.max(DETAIL_REACH),
             unknown: count(f64::is_nan),
             still: count(|length| length <= COPIED_BLUR),
             too_long: count(|length| length > LONGEST_BLUR),
@@ -146,29 +145,48 @@ impl WienerDeblur {
         self.exposure * (u * u + v * v).sqrt()
     }
 
-    /// The noise used (NaN when needless) and the regularisation that follows.
-    fn regularization<T: Real>(
+    /// The noise given or measured, root mean square over the channels; NaN when a constant regularisation makes it
+    /// needless.
+    fn noise_used<T: Real>(
         &self,
         images: &[ArrayView2<'_, T>],
         flow: &FlowView<'_, T>,
         control: &Control,
-    ) -> Result<(f64, Regularization)> {
-        if let Some(r) = self.regularization {
-            return Ok((f64::NAN, Regularization::Constant(r)));
+    ) -> Result<f64> {
+        match (self.regularization, self.noise) {
+            (Some(_), _) => Ok(f64::NAN),
+            (None, Some(noise)) => Ok(noise),
+            (None, None) => {
+                let mut power = 0.0;
+                for image in images {
+                    power += estimate_noise(image, flow, self.exposure, control)?.powi(2);
+                }
+                Ok((power / images.len() as f64).sqrt())
+            }
         }
-        // Mean powers over the channels, each of which is restored by itself.
-        let (mut noise_power, mut detail) = (0.0, 0.0);
+    }
+
+    /// Level of regularisation of each pixel, from the mean detail of the channels; all 0 when it is constant.
+    fn levels<T: Real>(
+        &self,
+        images: &[ArrayView2<'_, T>],
+        noise: f64,
+        control: &Control,
+    ) -> Result<Vec<u8>> {
+        let mut detail = Array2::<T>::zeros(images[0].dim());
+        if self.regularization.is_some() {
+            return Ok(vec![0; detail.len()]);
+        }
         for image in images {
-            let noise = match self.noise {
-                Some(noise) => noise,
-                None => estimate_noise(image, flow, self.exposure, control)?,
-            };
-            noise_power += noise * noise / images.len() as f64;
-            detail += spectrum_constant(image, noise, control)? / images.len() as f64;
+            detail += &local_detail(image, noise, control)?;
         }
-        // No detail at all: any kernel of unit sum leaves the constant picture what it is.
-        let ratio = if detail > 0.0 { noise_power / detail } else { 1.0 };
-        Ok((noise_power.sqrt(), Regularization::NoiseToDetail(ratio.max(LEAST_RATIO))))
+        let power = noise * noise * images.len() as f64;
+        let level = |c: &T| {
+            let c = c.as_f64();
+            // Neither noise nor detail: the division is 0 / 0, and any level leaves a constant what it is.
+            if c.is_nan() { UNKNOWN_LEVEL } else { level_of((power / c).max(0.0)) }
+        };
+        Ok(detail.iter().map(level).collect())
     }
 }
 
@@ -179,28 +197,34 @@ fn restore_row<T: Real>(
     bank: &KernelBank<T>,
     lines: &Streamlines<T>,
     splines: &[LocalSpline<T>],
+    levels: &[u8],
     y: usize,
     rows: &mut [T],
 ) {
     let width = rows.len() / splines.len();
     for x in 0..width {
         let motion = lines.motion(y, x);
-        let Some(kernel) = bank.kernel(method.blur_length(motion)) else { continue };
+        let level = levels[x];
+        let known = if level == UNKNOWN_LEVEL { 0 } else { level };
+        let Some(kernel) = bank.kernel(method.blur_length(motion), known) else { continue };
         let speed = (motion[0] * motion[0] + motion[1] * motion[1]).sqrt();
-        let time = T::one() / speed;
+        let time = T::of(2.0) / speed;
         for channel in 0..splines.len() {
-            rows[channel * width + x] *= kernel[0];
+            let sample = &mut rows[channel * width + x];
+            *sample = if level == UNKNOWN_LEVEL { T::nan() } else { *sample * kernel[0] };
         }
         let mut ahead = lines.start(y, x, motion, speed);
         let mut behind = ahead;
-        for &tap in &kernel[1..] {
-            lines.step(&mut ahead, time);
-            lines.step(&mut behind, -time);
-            let ([dx, dy], [bx, by]) = (ahead.offset, behind.offset);
-            let (there, back) = (Position::new(dy, dx), Position::new(by, bx));
-            for (channel, spline) in splines.iter().enumerate() {
-                rows[channel * width + x] +=
-                    tap * (spline.near(y, x, &there) + spline.near(y, x, &back));
+        for taps in kernel[1..].chunks_exact(2) {
+            lines.stride(&mut ahead, time);
+            lines.stride(&mut behind, -time);
+            let pairs = [(ahead.halfway, behind.halfway), (ahead.offset, behind.offset)];
+            for (&tap, ([ax, ay], [bx, by])) in taps.iter().zip(pairs) {
+                let (there, back) = (Position::new(ay, ax), Position::new(by, bx));
+                for (channel, spline) in splines.iter().enumerate() {
+                    let sum = spline.near(y, x, &there) + spline.near(y, x, &back);
+                    rows[channel * width + x] += tap * sum;
+                }
             }
         }
     }
