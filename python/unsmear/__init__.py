@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unsmear import metrics, plot
+from unsmear import metrics, plot, synthetic
 from unsmear._unsmear import __version__, get_num_threads, set_num_threads
 from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
@@ -32,6 +32,7 @@ __all__ = [
     "read_frames",
     "read_image",
     "set_num_threads",
+    "synthetic",
     "write_flow",
     "write_frames",
     "write_image",
