@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 from skimage import data
 from skimage.transform import resize
-
 from unsmear import synthetic, write_flow, write_image
 
 FOLDER = Path(__file__).parent.parent / "python" / "unsmear" / "data" / "demo"
@@ -69,7 +68,13 @@ def scene() -> synthetic.Scene:
 def main(folder: Path) -> None:
     """Write the clip."""
     clip = synthetic.record(
-        scene(), n_frames=FRAMES, exposure=1.0, n_subframes=96, noise=1.0, bits=8, seed=7
+        scene(),
+        n_frames=FRAMES,
+        exposure=1.0,
+        n_subframes=96,
+        noise=1.0,
+        bits=8,
+        seed=7,
     )
     for name in ("blurred", "sharp"):
         (folder / name).mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,11 @@ _FLOW = {"method": "least-squares", "tuning_frequency": 0.09, "neighbourhood": 3
 def add_arguments(verb: argparse.ArgumentParser) -> None:
     """Declare the options."""
     verb.add_argument(
-        "-o", "--output", default="unsmear_demo", metavar="DIR", help="default %(default)s"
+        "-o",
+        "--output",
+        default="unsmear_demo",
+        metavar="DIR",
+        help="default %(default)s",
     )
 
 
@@ -80,9 +84,7 @@ def run(options: argparse.Namespace) -> None:
     _common.show_result(result, as_json=options.json)
 
 
-def _restore(
-    clip: DemoClip, bar: ProgressBar
-) -> tuple[list[FlowResult], NDArray[Any]]:
+def _restore(clip: DemoClip, bar: ProgressBar) -> tuple[list[FlowResult], NDArray[Any]]:
     flows, restored = [], []
     for index, frame in enumerate(clip.blurred):
         flow = optical_flow(clip.blurred, index=index, channel_axis=3, **_FLOW)

@@ -48,8 +48,7 @@ class Layer:
         self.texture = as_floating(texture, "texture", np.float64)
         if self.texture.ndim not in (2, 3) or self.texture.size == 0:
             msg = (
-                "texture must have shape (H, W) or (H, W, C), "
-                f"got {self.texture.shape}"
+                f"texture must have shape (H, W) or (H, W, C), got {self.texture.shape}"
             )
             raise ValueError(msg)
         self.opacity: NDArray[np.float64] | None = None
@@ -74,7 +73,11 @@ class Layer:
         values = np.stack(
             [
                 _unsmear.sample(
-                    np.ascontiguousarray(planes[..., c]), y, x, _TEXTURE_DEGREE, "reflect"
+                    np.ascontiguousarray(planes[..., c]),
+                    y,
+                    x,
+                    _TEXTURE_DEGREE,
+                    "reflect",
                 )
                 for c in range(planes.shape[-1])
             ],
