@@ -1,4 +1,4 @@
-"""``unsmear demo``: the whole job on the bundled clip, with numbers against the truth."""
+"""``unsmear demo``: the whole job on the bundled clip, measured against the truth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ EXAMPLE = "unsmear demo -o unsmear_demo"
 
 # The clip moves up to 5.3 px/frame, within half a wavelength of this frequency; a
 # narrow neighbourhood keeps the disc's outline.
-_FLOW = {"method": "least-squares", "tuning_frequency": 0.09, "neighbourhood": 3.0}
+_FLOW: dict[str, Any] = {"method": "least-squares", "tuning_frequency": 0.09, "neighbourhood": 3.0}
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
