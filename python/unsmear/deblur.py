@@ -39,7 +39,8 @@ class DeblurResult:
         deviation in the units of the input, None if not used), ``regularization``
         (the constant r, None if it followed noise and detail), ``reach`` (px), counts
         of copied pixels (``unknown_pixels``, ``still_pixels``, ``too_long_pixels``),
-        ``pixels``, ``degree`` (method "thesis"), ``version``, ``warnings`` (list of str).
+        ``pixels``, ``degree`` (method "thesis"), ``version``, ``warnings`` (list of
+        str).
     """
 
     image: NDArray[Any]

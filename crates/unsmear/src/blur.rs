@@ -5,7 +5,7 @@
 //! ```
 //!
 //! v is the flow in px/frame taken as a steady field of velocity, e the exposure as a fraction of the frame interval,
-//! t = 0 its middle. (The content now at p was at X_p(-t) and will be at X_p(t); by symmetry of the exposure the sign
+//! t = 0 its middle. (The content now at p was at `X_p(-t)` and will be at `X_p(t)`; by symmetry of the exposure the sign
 //! does not matter.) x is interpolated by the cubic spline of `local_spline.rs`, continued by its edge pixels, and the
 //! integral is Simpson's rule with at least two intervals per px of blur, whose relative error at w rad/px along the
 //! path is `(w/2)^4 / 180`: 0.04 % at w = 1. Pixels without motion, or of unknown (NaN) motion, are copied.

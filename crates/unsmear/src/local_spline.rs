@@ -71,24 +71,45 @@ impl<T: Real> LocalSpline<T> {
         Ok(Self { coefficients, stride })
     }
 
-    /// Value `dy`, `dx` (px) from the pixel (y, x); the sum must lie within the picture.
+    /// Value at a position near the pixel (y, x), which must lie within the picture.
     #[inline(always)]
     pub(crate) fn near(&self, y: usize, x: usize, at: &Position<T>) -> T {
-        let top = (y as isize + at.row) as usize * self.stride + (x as isize + at.column) as usize;
         let mut columns = [T::zero(); 4];
-        for (i, wy) in at.down.into_iter().enumerate() {
-            let row = &self.coefficients[top + i * self.stride..][..4];
-            for (sum, &c) in columns.iter_mut().zip(row) {
-                *sum += wy * c;
-            }
+        self.add_near(y, x, at, T::one(), &mut columns);
+        sum_of(&columns)
+    }
+
+    /// Adds `weight` times the value at a position to the sum of `columns`, whose four parts stay apart so that they
+    /// fill a vector register.
+    #[inline(always)]
+    pub(crate) fn add_near(
+        &self,
+        y: usize,
+        x: usize,
+        at: &Position<T>,
+        weight: T,
+        columns: &mut [T; 4],
+    ) {
+        let top = (y as isize + at.row) as usize * self.stride + (x as isize + at.column) as usize;
+        let patch = &self.coefficients[top..top + 3 * self.stride + 4];
+        let row = |i: usize| &patch[i * self.stride..i * self.stride + 4];
+        let ([wa, wb, wc, wd], across) = (at.down, at.across);
+        let (a, b, c, d) = (row(0), row(1), row(2), row(3));
+        for j in 0..4 {
+            let value = (wa * a[j] + wb * b[j]) + (wc * c[j] + wd * d[j]);
+            columns[j] += weight * across[j] * value;
         }
-        let [a, b, c, d] = columns;
-        let [wa, wb, wc, wd] = at.across;
-        (a * wa + b * wb) + (c * wc + d * wd)
     }
 }
 
+/// Sum of the parts of [`LocalSpline::add_near`].
+#[inline(always)]
+pub(crate) fn sum_of<T: Real>(columns: &[T; 4]) -> T {
+    (columns[0] + columns[1]) + (columns[2] + columns[3])
+}
+
 /// Where four by four coefficients start, relative to a pixel, and their weights; shared by the channels.
+#[derive(Clone, Copy)]
 pub(crate) struct Position<T> {
     row: isize,
     column: isize,
