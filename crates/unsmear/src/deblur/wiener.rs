@@ -30,7 +30,7 @@ use crate::array::{for_each_row, require_same};
 use crate::control::Control;
 use crate::error::{Error, Result, require};
 use crate::flow_field::FlowView;
-use crate::local_spline::{LocalSpline, Position, VALUE_REACH, sum_of};
+use crate::local_spline::{LocalSpline, Path, VALUE_REACH};
 use crate::noise::estimate_noise;
 use crate::real::Real;
 use crate::streamline::Streamlines;
@@ -208,7 +208,7 @@ fn restore_row<T: Real>(
     rows: &mut [T],
 ) {
     let width = rows.len() / splines.len();
-    let mut path = Vec::with_capacity(2 * bank.reach());
+    let mut path = Path::new(2 * bank.reach());
     for x in 0..width {
         let motion = lines.motion(y, x);
         let level = levels[x];
@@ -217,19 +217,17 @@ fn restore_row<T: Real>(
         let speed = (motion[0] * motion[0] + motion[1] * motion[1]).sqrt();
         walk(lines, [y, x], motion, speed, kernel.len() - 1, &mut path);
         for (channel, spline) in splines.iter().enumerate() {
-            let mut columns = [T::zero(); 4];
-            for (&tap, pair) in kernel[1..].iter().zip(path.chunks_exact(2)) {
-                spline.add_near(y, x, &pair[0], tap, &mut columns);
-                spline.add_near(y, x, &pair[1], tap, &mut columns);
-            }
             let sample = &mut rows[channel * width + x];
-            let unknown = level == UNKNOWN_LEVEL;
-            *sample = if unknown { T::nan() } else { *sample * kernel[0] + sum_of(&columns) };
+            *sample = if level == UNKNOWN_LEVEL {
+                T::nan()
+            } else {
+                *sample * kernel[0] + spline.weighted_sum(y, x, &path, &kernel[1..])
+            };
         }
     }
 }
 
-/// Writes the positions ahead and behind, in turn, at 1, 2 .. `steps` px (even) from the pixel on its streamline.
+/// Writes the points ahead and behind, in turn, at 1, 2 .. `steps` px (even) from the pixel on its streamline.
 #[inline(always)]
 fn walk<T: Real>(
     lines: &Streamlines<T>,
@@ -237,7 +235,7 @@ fn walk<T: Real>(
     motion: [T; 2],
     speed: T,
     steps: usize,
-    path: &mut Vec<Position<T>>,
+    path: &mut Path<T>,
 ) {
     // Two steps a stride.
     let time = T::of(2.0) / speed;
@@ -247,8 +245,9 @@ fn walk<T: Real>(
     for _ in 0..steps / 2 {
         lines.stride(&mut ahead, time);
         lines.stride(&mut behind, -time);
-        for [dx, dy] in [ahead.halfway, behind.halfway, ahead.offset, behind.offset] {
-            path.push(Position::new(dy, dx));
+        for point in [ahead.halfway, behind.halfway, ahead.offset, behind.offset] {
+            path.push(point);
         }
     }
+    path.prepare();
 }
