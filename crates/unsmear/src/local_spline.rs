@@ -156,7 +156,7 @@ impl<T: Real> Axis<T> {
         for i in 0..n {
             let floor = offsets[i].floor();
             // The coefficient before the cell: -1, and the padding.
-            whole[i] = floor.as_f64() as i32 + (PAD as i32 - 1);
+            whole[i] = floor.as_i32() + (PAD as i32 - 1);
             [a[i], b[i], c[i], d[i]] = spline_weights(offsets[i] - floor);
         }
     }
