@@ -71,13 +71,19 @@ def components(
     """Phase gradients (22, H, W, 3), amplitudes, centres (22, 3) and sigma."""
     bank = velocity_tuned_wavevectors(tuning_frequency)
     sigma = window_sigma(tuning_frequency, bandwidth_octaves)
+    # Time first: the filters share three carriers in time, and the border rule in space
+    # commutes with sums over frames, so only one frame per filter is left for space.
+    in_time = {
+        omega: np.stack(respond_in_time(frames, index, omega, sigma, support))
+        for omega in set(bank[:, 2].tolist())
+    }
     gradients, amplitudes = [], []
     for centre in bank:
-        spatial = respond(frames, centre[:2], sigma, support, border)
-        response, slope = respond_in_time(spatial, index, centre[2], sigma, support)
+        omega = float(centre[2])
+        response, slope = respond(in_time[omega], centre[:2], sigma, support, border)
         gradient = np.empty((*response.shape, 3))
         gradient[..., :2] = spatial_gradient(response, centre[:2])
-        gradient[..., 2] = time_slope(response, slope, float(centre[2]))
+        gradient[..., 2] = time_slope(response, slope, omega)
         gradients.append(gradient)
         amplitudes.append(np.abs(response))
     return np.array(gradients), np.array(amplitudes), bank, sigma
@@ -152,7 +158,7 @@ def fleet_jepson(
     )
     valid = (amplitude >= threshold) & (deviation <= tau)
     velocity = component_velocity(gradient, valid)
-    used = np.isfinite(velocity).all(-1)
+    used: NDArray[np.bool_] = np.asarray(np.isfinite(velocity).all(-1))
     normal = np.where(used[..., None], gradient[..., :2], 1.0)
     normal = normal / np.sqrt((normal**2).sum(-1, keepdims=True))
     speed = (np.where(used[..., None], velocity, 0.0) * normal).sum(-1)

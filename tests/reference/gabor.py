@@ -102,7 +102,7 @@ def spatial_taps(
 
 
 def respond(
-    frames: Real,
+    frames: Real | Complex,
     wavevector: Real,
     sigma: float,
     support: float = 3.0,
@@ -138,25 +138,27 @@ def temporal_taps(omega: float, sigma: float, radius: int) -> tuple[Complex, Com
 
 
 def respond_in_time(
-    spatial: Complex, index: int, omega: float, sigma: float, support: float = 3.0
+    frames: Real, index: int, omega: float, sigma: float, support: float = 3.0
 ) -> tuple[Complex, Complex]:
-    """Response and demodulated time slope at frame ``index`` of (T, H, W) responses.
+    """Response and demodulated time slope at frame ``index`` of (T, H, W) frames.
 
+    Filtering in space commutes with this and may come before or after. Equal frames
+    give a slope of exactly 0 at omega = 0.
     The window is cut symmetrically to the frames there are on *both* sides: a lopsided
     one would measure the motion of another instant.
     """
-    count = spatial.shape[0]
+    count = frames.shape[0]
     radius = min(index, count - 1 - index, int(np.ceil(support * sigma)))
     if radius < 1:
         raise ValueError(
             f"index: expected a frame on each side of it, got {index} of {count} frames"
         )
     taps, slopes = temporal_taps(omega, sigma, radius)
-    centre: Complex = taps[radius] * spatial[index]
+    centre: Complex = taps[radius] * frames[index]
     rate = np.zeros_like(centre)
     # Pair by pair, for the exact cancellation; the slope's middle tap is zero.
     for n in range(1, radius + 1):
-        later, earlier = spatial[index + n], spatial[index - n]
+        later, earlier = frames[index + n], frames[index - n]
         centre = centre + (taps[radius + n] * later + taps[radius - n] * earlier)
         rate = rate + (slopes[radius + n] * later + slopes[radius - n] * earlier)
     return centre, rate

@@ -24,8 +24,7 @@ of two frames: exact for any uniform shift below half a wavelength, which is wha
 three frames allow.
 
 NaN where R = 0 (no phase). References: D. J. Fleet, A. D. Jepson, Int. J. Comput.
-Vision 5 (1990) 77-104, eq. for the phase gradient in section 3,
-doi:10.1007/BF00056772.
+Vision 5 (1990) 77-104, doi:10.1007/BF00056772.
 """
 
 from __future__ import annotations

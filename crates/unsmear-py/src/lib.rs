@@ -1,20 +1,37 @@
 //! The private module `unsmear._unsmear`: converts, calls the core, wraps. The API is the Python package around it.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 use pyo3::prelude::*;
 
+mod arrays;
+mod component_velocity;
+mod convolve;
 mod deblur;
 mod errors;
+mod flow;
+mod metrics;
+mod parameters;
 mod psf;
+mod thesis;
 mod threads;
 
 /// Private core of `unsmear`; import the package instead.
 #[pymodule]
 mod _unsmear {
     #[pymodule_export]
+    use crate::component_velocity::{component_velocities, gabor_phase_gradient};
+    #[pymodule_export]
+    use crate::convolve::correlate_separable;
+    #[pymodule_export]
     use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
     #[pymodule_export]
+    use crate::flow::{fleet_jepson, least_squares};
+    #[pymodule_export]
+    use crate::metrics::{error_map, psnr, ssim};
+    #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
+    #[pymodule_export]
+    use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]
     use crate::threads::{get_num_threads, set_num_threads};
 

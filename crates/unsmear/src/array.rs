@@ -88,7 +88,7 @@ mod tests {
     fn visits_every_row_once_and_stops_on_request() {
         let mut out = vec![0usize; 7 * 21];
         for_each_row(&mut out, 7, &Control::new(), |y, row| {
-            row.iter_mut().for_each(|s| *s += y + 1)
+            row.iter_mut().for_each(|s| *s += y + 1);
         })
         .unwrap();
         assert!(out.chunks(7).enumerate().all(|(y, row)| row.iter().all(|&s| s == y + 1)));

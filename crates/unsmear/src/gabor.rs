@@ -68,7 +68,7 @@ impl GaborParameters {
         (ratio + 1.0) / ((ratio - 1.0) * self.wavenumber())
     }
 
-    fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         require("tuning_frequency", self.tuning_frequency, "in (0, 0.5) cycles/px", |f| {
             f > 0.0 && f < 0.5
         })?;
@@ -132,14 +132,21 @@ impl<T: Real> GaborBank<T> {
     /// [`Error::Value`](crate::Error::Value) when a parameter is outside its documented range.
     pub fn new(parameters: &GaborParameters) -> Result<Self> {
         parameters.check()?;
-        let (n, k0, sigma) = (parameters.orientations, parameters.wavenumber(), parameters.sigma());
-        let radius = (parameters.support * sigma).ceil() as usize;
+        let GaborParameters { orientations, support, .. } = *parameters;
+        Ok(Self::tuned(parameters.wavenumber(), parameters.sigma(), orientations, support))
+    }
+
+    /// A bank whose wavenumber `k0` (rad/px) and window deviation `sigma` (px) are chosen apart;
+    /// the parameters have been checked.
+    pub(crate) fn tuned(k0: f64, sigma: f64, n: usize, support: f64) -> Self {
+        let radius = (support * sigma).ceil() as usize;
         let gaussian = gaussian_taps(sigma, radius);
         let wavevectors: Vec<[f64; 2]> = (0..n).map(|j| wavevector(k0, j, n)).collect();
         let mut bank = Self { sigma, radius, wavevectors, along_x: Vec::new(), pairs: Vec::new() };
         for filter in 0..=n / 2 {
             let [kx, ky] = bank.wavevectors[filter];
-            let x_carries = kx.abs() >= ky.abs();
+            // The slack keeps rounding from moving a true tie (45 degrees) to y.
+            let x_carries = kx.abs() >= ky.abs() * (1.0 - 1e-12);
             bank.pairs.push(MirrorPair {
                 along_x: bank.along_x.len(),
                 along_y: EvenOdd::new(&gaussian, ky, !x_carries),
@@ -148,7 +155,7 @@ impl<T: Real> GaborBank<T> {
             });
             bank.along_x.push(EvenOdd::new(&gaussian, kx, x_carries));
         }
-        Ok(bank)
+        bank
     }
 
     /// Deviation of the Gaussian window, px; its inverse is that of the spectrum, rad/px.
@@ -190,7 +197,8 @@ impl<T: Real> GaborBank<T> {
             &mut responses.data,
             planes * width,
             control,
-            || vec![T::zero(); 4 * width],
+            // The last row stays 0: what a zero border reads.
+            || vec![T::zero(); 5 * width],
             |y, out, scratch| {
                 for pair in &self.pairs {
                     self.filter_column(pair, &filtered, [y, height, width], border, scratch, out);
@@ -235,15 +243,13 @@ impl<T: Real> GaborBank<T> {
         out: &mut [T],
     ) {
         let stride = 2 * self.along_x.len() * width;
-        let zeros = vec![T::zero(); width];
+        let (scratch, zeros) = scratch.split_at_mut(4 * width);
+        let zeros = &*zeros;
         let line = |j: usize, part: usize| {
-            border.index((y + j) as isize - self.radius as isize, height).map_or(
-                zeros.as_slice(),
-                |row| {
-                    let start = row * stride + (2 * pair.along_x + part) * width;
-                    &filtered[start..start + width]
-                },
-            )
+            border.index((y + j) as isize - self.radius as isize, height).map_or(zeros, |row| {
+                let start = row * stride + (2 * pair.along_x + part) * width;
+                &filtered[start..start + width]
+            })
         };
         let lines = |part| (0..=2 * self.radius).map(|j| line(j, part)).collect::<Vec<&[T]>>();
         let (first, second) = scratch.split_at_mut(2 * width);
@@ -390,7 +396,7 @@ mod tests {
                 for (y, x) in [(0, 0), (4, 18), (8, 36), (2, 30)] {
                     let mut sum = [0.0; 2];
                     for (j, i) in (-r..=r).flat_map(|j| (-r..=r).map(move |i| (j, i))) {
-                        let x_carries = kx.abs() >= ky.abs();
+                        let x_carries = kx.abs() >= ky.abs() * (1.0 - 1e-12);
                         let [a, b] = factor(kx, x_carries, i);
                         let [c, s] = factor(ky, !x_carries, j);
                         let sample = picture[(

@@ -12,11 +12,11 @@
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
 #![deny(unsafe_code)]
-#![warn(missing_docs)]
 
 mod array;
 pub mod blur;
 pub mod border;
+pub mod component_velocity;
 pub mod control;
 pub mod convolve;
 pub mod deblur;
@@ -32,6 +32,7 @@ pub mod noise;
 pub mod phase_gradient;
 pub mod psf;
 pub mod real;
+pub mod spatiotemporal;
 mod streamline;
 
 pub use border::Border;

@@ -127,7 +127,22 @@ struct Stencil<T> {
     sines: [T; 4],
 }
 
-type ComplexRow<'a, T> = (&'a [T], &'a [T]);
+/// `arg(conj(R) R')` of a row: the phase advance from one frame to the next, rad in (-pi, pi].
+///
+/// Exact for any uniform shift below half a wavelength; exactly 0 for equal responses.
+pub fn phase_step<T: Real>(first: ComplexRow<'_, T>, second: ComplexRow<'_, T>, out: &mut [T]) {
+    let n = out.len();
+    let ((a_re, a_im), (b_re, b_im)) = (first, second);
+    let (a_re, a_im, b_re, b_im) = (&a_re[..n], &a_im[..n], &b_re[..n], &b_im[..n]);
+    for x in 0..n {
+        let across = a_re[x] * b_im[x] - a_im[x] * b_re[x];
+        let along = a_re[x] * b_re[x] + a_im[x] * b_im[x];
+        out[x] = across.atan2(along);
+    }
+}
+
+/// Real and imaginary part of a row.
+pub type ComplexRow<'a, T> = (&'a [T], &'a [T]);
 
 impl<T: Real> Stencil<T> {
     fn new(wavenumber: f64) -> Self {

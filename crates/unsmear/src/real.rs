@@ -9,7 +9,7 @@ mod sealed {
 }
 
 /// `f32` or `f64`. Sealed: kernels are tuned and tested for these two only.
-pub trait Real: NdFloat + sealed::Sealed {
+pub trait Real: NdFloat + Default + sealed::Sealed {
     /// The nearest value of this type; parameters are computed in `f64` and rounded once, here.
     fn of(value: f64) -> Self;
     /// This value as `f64`, exactly.

@@ -13,7 +13,7 @@
 //! frame and 5/12 at the others, one of the reasons for speeds that are far too low.
 
 use multiversion::multiversion;
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Zip};
 
 use crate::control::Control;
 use crate::error::Result;
@@ -50,9 +50,22 @@ pub fn filter_in_time(responses: &[Array2<Complex64>], taps: &[f64]) -> Response
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn component_velocities(response: &Response, control: &Control) -> Result<[Array3<f64>; 2]> {
+    let [mut un, mut vn, phi_t] = phase_gradient(response, control)?;
+    Zip::from(&mut un).and(&mut vn).and(&phi_t).for_each(|phi_x, phi_y, phi_t| {
+        let scale = -phi_t / (*phi_x * *phi_x + *phi_y * *phi_y);
+        *phi_x *= scale;
+        *phi_y *= scale;
+    });
+    Ok([un, vn])
+}
+
+/// `phi_x`, `phi_y` (rad/px) and `phi_t` (rad/frame) in every frame (T, H, W); NaN where `R = 0`.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn phase_gradient(response: &Response, control: &Control) -> Result<[Array3<f64>; 3]> {
     let (frames, height, width) = response.re.dim();
-    let (mut un, mut vn) =
-        (Array3::zeros((frames, height, width)), Array3::zeros((frames, height, width)));
+    let mut phi = [(); 3].map(|()| vec![0.0; frames * height * width]);
     let zeros = vec![0.0; width];
     let mut padded = [vec![0.0; width + 4], vec![0.0; width + 4]];
     let parts = [&response.re, &response.im].map(|part| part.as_slice().unwrap_or_default());
@@ -62,21 +75,22 @@ pub fn component_velocities(response: &Response, control: &Control) -> Result<[A
         }
         _ => [zeros.as_slice(); 2],
     };
-    for (t, (mut un, mut vn)) in un.outer_iter_mut().zip(vn.outer_iter_mut()).enumerate() {
-        for (y, (mut un, mut vn)) in un.outer_iter_mut().zip(vn.outer_iter_mut()).enumerate() {
-            control.check()?;
-            let here = row(Some(t), Some(y));
-            padded.iter_mut().zip(here).for_each(|(p, row)| p[2..2 + width].copy_from_slice(row));
-            let along_x = [0, 1, 3, 4].map(|i| [0, 1].map(|part| &padded[part][i..i + width]));
-            let step = |position: usize, by: isize| position.checked_add_signed(by);
-            let along_y = [-2, -1, 1, 2].map(|by| row(Some(t), step(y, by)));
-            let along_t = [-2, -1, 1, 2].map(|by| row(step(t, by), Some(y)));
-            if let (Some(un), Some(vn)) = (un.as_slice_mut(), vn.as_slice_mut()) {
-                component_row(here, along_x, along_y, along_t, un, vn);
-            }
+    for (t, y) in (0..frames).flat_map(|t| (0..height).map(move |y| (t, y))) {
+        control.check()?;
+        let here = row(Some(t), Some(y));
+        padded.iter_mut().zip(here).for_each(|(p, row)| p[2..2 + width].copy_from_slice(row));
+        let step = |position: usize, by: isize| position.checked_add_signed(by);
+        let neighbours = [
+            [0, 1, 3, 4].map(|i| [0, 1].map(|part| &padded[part][i..i + width])),
+            [-2, -1, 1, 2].map(|by| row(Some(t), step(y, by))),
+            [-2, -1, 1, 2].map(|by| row(step(t, by), Some(y))),
+        ];
+        for (phi, along) in phi.iter_mut().zip(neighbours) {
+            phase_rate(here, along, &mut phi[(t * height + y) * width..][..width]);
         }
     }
-    Ok([un, vn])
+    let shape = (frames, height, width);
+    Ok(phi.map(|phi| Array3::from_shape_vec(shape, phi).unwrap_or_default()))
 }
 
 /// Real and imaginary part of a row.
@@ -94,34 +108,17 @@ fn slope(a: f64, b: f64, c: f64, d: f64) -> f64 {
     (c - b) * (8.0 / 12.0) - (d - a) / 12.0
 }
 
+/// `Im(conj(R) dR) / |R|^2` of a row, from its neighbours at -2, -1, 1 and 2.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn component_row(
-    [re, im]: Row<'_>,
-    along_x: [Row<'_>; 4],
-    along_y: [Row<'_>; 4],
-    along_t: [Row<'_>; 4],
-    un: &mut [f64],
-    vn: &mut [f64],
-) {
-    let n = un.len();
-    let (re, im, vn) = (&re[..n], &im[..n], &mut vn[..n]);
-    let [[ax, bx], [cx, dx], [ex, fx], [gx, hx]] = cut(along_x, n);
-    let [[ay, by], [cy, dy], [ey, fy], [gy, hy]] = cut(along_y, n);
-    let [[at, bt], [ct, dt], [et, ft], [gt, ht]] = cut(along_t, n);
+fn phase_rate([re, im]: Row<'_>, along: [Row<'_>; 4], phi: &mut [f64]) {
+    let n = phi.len();
+    let (re, im) = (&re[..n], &im[..n]);
+    let [[a_re, a_im], [b_re, b_im], [c_re, c_im], [d_re, d_im]] = cut(along, n);
     for x in 0..n {
+        let slope_re = slope(a_re[x], b_re[x], c_re[x], d_re[x]);
+        let slope_im = slope(a_im[x], b_im[x], c_im[x], d_im[x]);
         let power = re[x] * re[x] + im[x] * im[x];
-        let phi_x = (re[x] * slope(bx[x], dx[x], fx[x], hx[x])
-            - im[x] * slope(ax[x], cx[x], ex[x], gx[x]))
-            / power;
-        let phi_y = (re[x] * slope(by[x], dy[x], fy[x], hy[x])
-            - im[x] * slope(ay[x], cy[x], ey[x], gy[x]))
-            / power;
-        let phi_t = (re[x] * slope(bt[x], dt[x], ft[x], ht[x])
-            - im[x] * slope(at[x], ct[x], et[x], gt[x]))
-            / power;
-        let scale = -phi_t / (phi_x * phi_x + phi_y * phi_y);
-        un[x] = scale * phi_x;
-        vn[x] = scale * phi_y;
+        phi[x] = (re[x] * slope_im - im[x] * slope_re) / power;
     }
 }
 

@@ -26,7 +26,7 @@ pub mod components;
 pub mod gated_mean;
 
 use bank::Bank;
-use components::{component_velocities, filter_in_time};
+use components::{Response, component_velocities, filter_in_time};
 use gated_mean::GatedMean;
 
 /// What happens to static pixels, those whose central time difference is exactly 0 in every frame.
@@ -112,9 +112,25 @@ impl ThesisFlow {
         require_frames("frames", &frames, [2, 1, 1])?;
         self.gate.check()?;
         let moving = moving_pixels(frames);
+        self.for_each_filter(frames, &moving, control, |response| {
+            Ok(component_velocities(response, control)?.map(|part| self.finish(part, &moving)))
+        })
+    }
+
+    /// What `stage` makes of the response `R` (T, H, W) of every filter, in parallel over filters.
+    ///
+    /// # Errors
+    /// As [`ThesisFlow::estimate`], and those of `stage`.
+    pub fn for_each_filter<S: Send>(
+        &self,
+        frames: ArrayView3<'_, f64>,
+        moving: &Array2<f64>,
+        control: &Control,
+        stage: impl Fn(&Response) -> Result<S> + Sync,
+    ) -> Result<Vec<S>> {
         let mut pictures = frames.to_owned();
         if self.zero_static == ZeroStatic::ImageAndVelocity {
-            pictures *= &moving;
+            pictures *= moving;
         }
         let mut frequency = self.tuning_frequency;
         if self.interpolate {
@@ -143,9 +159,9 @@ impl ThesisFlow {
                     .iter()
                     .map(|frame| convolver.convolve(frame, &kernel, scratch, control))
                     .collect::<Result<Vec<_>>>()?;
-                let parts = component_velocities(&filter_in_time(&responses, &taps), control)?;
+                let result = stage(&filter_in_time(&responses, &taps))?;
                 control.advance()?;
-                Ok(parts.map(|part| self.finish(part, &moving)))
+                Ok(result)
             })
             .collect()
     }

@@ -1,0 +1,200 @@
+"""Optical flow of an image sequence: one call, several methods."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unsmear import _unsmear
+from unsmear._arrays import as_grey_frames
+from unsmear._parameters import PARAMETERS, merged
+from unsmear._progress import of_steps
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from unsmear._progress import Progress
+
+__all__ = ["FlowResult", "optical_flow"]
+
+_LEAST_FRAMES = {"least-squares": 2, "fleet-jepson": 3, "thesis": 2}
+
+
+@dataclass(frozen=True)
+class FlowResult:
+    """Flow of one frame and how far to trust it.
+
+    Attributes
+    ----------
+    flow : ndarray of shape (H, W, 2), float32
+        ``(u, v)``, right and down, px/frame, from the reference frame to the next; NaN
+        where nothing is known.
+    confidence : ndarray of shape (H, W), float32
+        In [0, 1]; 0 where the flow is unknown.
+    valid : ndarray of shape (H, W), bool
+        Where the flow is known.
+    report : dict
+        Method, parameters, frames used, timings and warnings: plain data that
+        ``json.dumps`` takes, enough to repeat the result.
+    """
+
+    flow: NDArray[np.float32]
+    confidence: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    report: dict[str, Any] = field(repr=False)
+
+
+def optical_flow(
+    frames: ArrayLike,
+    *,
+    index: int | None = None,
+    method: str = "least-squares",
+    channel_axis: int | None = None,
+    progress: Progress | None = None,
+    **parameters: Any,
+) -> FlowResult:
+    r"""Measure the motion of every pixel of one frame.
+
+    Every method filters the frames with Gabor filters and follows surfaces of constant
+    phase, ``grad phi . (u, v, 1) = 0``; phase does not change with brightness and
+    contrast, so neither does the result.
+
+    Parameters
+    ----------
+    frames : array_like of shape (T, H, W)
+        Integers or floats of any scale; the input is not modified and must not be
+        during the call. Colour sequences need ``channel_axis``.
+    index : int, optional
+        Frame whose motion (to the next frame) is measured; default ``(T - 1) // 2``.
+        Negative values count from the end. "thesis" pools all frames and ignores it.
+    method : {"least-squares", "fleet-jepson", "thesis"}
+        - "least-squares": phase differences of neighbouring frames, local least squares
+          at one scale; 2 frames are enough, about 7 are best, motion up to 4 px/frame.
+          The default because it answers nearly everywhere.
+        - "fleet-jepson": 22 velocity-tuned filters and local affine least squares; 3
+          frames at least, 15 fill its windows. More exact, and silent (NaN) where its
+          tests fail, often on half of a picture.
+        - "thesis": the founding method, flaws included (speeds come out at a tenth to a
+          fifth of the truth); for comparison with published figures only.
+    channel_axis : int, optional
+        Axis of the 3 colour channels; they are reduced to Rec. 601 luma. A shape never
+        decides: without it, frames have three axes.
+    progress : callable, optional
+        Called with the share done in [0, 1]; an exception it raises cancels the call.
+    **parameters
+        Parameters of the method. Common to all: ``tuning_frequency`` (cycles/px, in
+        (0, 0.5)), ``bandwidth_octaves``.
+
+        "least-squares": ``tuning_frequency=0.12`` (sees half a wavelength, 4.2 px),
+        ``bandwidth_octaves=0.8``, ``orientations=6``, ``support=3.0`` (deviations of
+        the filters' window), ``amplitude_fraction=0.02`` (of the largest amplitude:
+        where weights halve), ``tau=1.25`` (deviations from the tuned frequency, where
+        weights halve), ``neighbourhood=4.0`` (px, deviation of the local window; 0
+        solves each pixel alone), ``time_sigma=1.5`` (frames), ``robust=0.5`` (rad),
+        ``passes=2``, ``least_eigenvalue=1e-3``, ``border="replicate"``.
+
+        "fleet-jepson": ``tuning_frequency=1/4.25``, ``bandwidth_octaves=0.8``,
+        ``support=3.0``, ``amplitude_fraction=0.05`` and ``tau=1.25`` (hard tests),
+        ``window_radius=2`` (px), ``least_constraints=12``, ``condition_limit=8.0``,
+        ``residual_limit=0.05`` (px/frame), ``border="replicate"``.
+
+        "thesis": ``tuning_frequency=0.06``, ``bandwidth_octaves=0.8``,
+        ``zero_static="none"`` (or "velocity", "image+velocity"), ``interpolate=False``
+        (doubles the picture; velocities stay in half pixels, as published),
+        ``std_limit=5.0``, ``distance_limit=2.0``, ``least_fraction=10/12``.
+
+    Returns
+    -------
+    FlowResult
+        ``flow``, ``confidence``, ``valid`` and ``report``.
+
+    Raises
+    ------
+    ValueError
+        Too few frames or too small, ``index`` out of range, samples that are not
+        finite, an unknown method or parameter, or a value out of range.
+    TypeError
+        ``frames`` are not real numbers, or a parameter has the wrong type.
+
+    References
+    ----------
+    .. [1] D. J. Fleet, A. D. Jepson, "Computation of component image velocity from
+       local phase information", IJCV 5 (1990) 77-104, doi:10.1007/BF00056772
+    .. [2] C. Texin, "Optical Flow Using Phase Information for Deblurring", MIT MEng
+       thesis, 2007 ("thesis")
+
+    Examples
+    --------
+    >>> import numpy as np, unsmear
+    >>> sequence = unsmear.synthetic.translation(
+    ...     unsmear.synthetic.texture((96, 96), seed=1), (1.5, -0.5), shape=(64, 64))
+    >>> r = unsmear.optical_flow(sequence.sharp, method="least-squares")
+    >>> np.nanmedian(r.flow, axis=(0, 1)).round(1).tolist()
+    [1.5, -0.5]
+    """
+    values = merged(method, parameters)
+    grey = as_grey_frames(frames, channel_axis, np.float64)
+    least = _LEAST_FRAMES[method]
+    if grey.shape[0] < least or 0 in grey.shape:
+        msg = (
+            f"frames must have shape (T >= {least}, H >= 1, W >= 1) for method "
+            f"{method!r}, got {np.shape(frames)}"
+        )
+        raise ValueError(msg)
+    reference = reference_frame(index, grey.shape[0])
+    started = time.perf_counter()
+    flow, confidence = _run(method, grey, reference, values, progress)
+    valid = ~np.isnan(flow).any(axis=-1)
+    return FlowResult(
+        flow=flow,
+        confidence=confidence,
+        valid=valid,
+        report={
+            "method": method,
+            "parameters": values,
+            "frames": list(grey.shape),
+            "index": reference,
+            "density": float(valid.mean()),
+            "seconds": time.perf_counter() - started,
+            "threads": _unsmear.get_num_threads(),
+            "version": _unsmear.__version__,
+            "warnings": [] if valid.any() else ["nothing to measure motion on"],
+        },
+    )
+
+
+def reference_frame(index: int | None, count: int) -> int:
+    """Return the index of the reference frame, counted from the start."""
+    if index is None:
+        return (count - 1) // 2
+    if not -count <= index < count:
+        msg = f"index must be in {-count}..{count - 1}, got {index}"
+        raise ValueError(msg)
+    return index % count
+
+
+def _run(
+    method: str,
+    grey: NDArray[np.float64],
+    index: int,
+    values: dict[str, Any],
+    progress: Progress | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    steps = of_steps(progress)
+    if method == "thesis":
+        if not np.isfinite(grey).all():
+            msg = "frames must be finite everywhere for method 'thesis'"
+            raise ValueError(msg)
+        exact = _unsmear.thesis_flow(grey, values, progress=steps)
+        known = ~np.isnan(exact).any(axis=-1)
+        # The founding method has no measure of trust: known or not.
+        return exact.astype(np.float32), known.astype(np.float32)
+    if method == "least-squares":
+        return _unsmear.least_squares(grey, index, values, progress=steps)
+    return _unsmear.fleet_jepson(grey, index, values, progress=steps)
+
+
+assert set(_LEAST_FRAMES) == set(PARAMETERS), "every method has its parameters"
