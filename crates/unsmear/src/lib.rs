@@ -6,6 +6,8 @@
 //! |---|---|
 //! | [`error`], [`real`], [`border`], [`control`] | failures, scalars, picture edges, cancellation |
 //! | [`flow_field`] | a field of motion |
+//! | [`psf`], [`blur`] | kernels of motion; what motion does to a picture |
+//! | [`noise`], [`deblur`] | noise under motion blur; its removal pixel by pixel |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
