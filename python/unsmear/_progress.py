@@ -15,19 +15,18 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     Progress = Callable[[float], object]
-    Steps = Callable[[tuple[int, int]], object]
+    Steps = Callable[[int, int], object]
 
 _WIDTH = 24
 _REDRAW = 0.1  # seconds
 
 
 def of_steps(progress: Progress | None) -> Steps | None:
-    """Turn a callback on the share done into one on (steps done, steps expected)."""
+    """Turn a callback on the share done into one on steps done and steps expected."""
     if progress is None:
         return None
 
-    def report(steps: tuple[int, int]) -> None:
-        done, expected = steps
+    def report(done: int, expected: int) -> None:
         progress(min(1.0, done / expected) if expected else 0.0)
 
     return report
