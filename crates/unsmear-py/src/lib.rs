@@ -6,10 +6,12 @@ use pyo3::prelude::*;
 mod arrays;
 mod component_velocity;
 mod convolve;
+mod deblur;
 mod errors;
 mod flow;
 mod metrics;
 mod parameters;
+mod psf;
 mod thesis;
 mod threads;
 
@@ -21,9 +23,13 @@ mod _unsmear {
     #[pymodule_export]
     use crate::convolve::correlate_separable;
     #[pymodule_export]
+    use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
+    #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
     #[pymodule_export]
     use crate::metrics::{error_map, psnr, ssim};
+    #[pymodule_export]
+    use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]
     use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]

@@ -12,20 +12,26 @@
 #![deny(unsafe_code)]
 
 mod array;
+pub mod blur;
 pub mod border;
 pub mod component_velocity;
 pub mod control;
 pub mod convolve;
+pub mod deblur;
 pub mod error;
 pub mod fft_convolve;
 pub mod flow;
 pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
+mod local_spline;
 pub mod metrics;
+pub mod noise;
 pub mod phase_gradient;
+pub mod psf;
 pub mod real;
 pub mod spatiotemporal;
+mod streamline;
 
 pub use border::Border;
 pub use control::Control;

@@ -1,0 +1,52 @@
+# Two commands do everything on a machine with Python 3.11, Rust, gcc and make:
+#   make demo    sets up and runs the whole job on the bundled clip
+#   make test    sets up and passes all tests
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find crates python -name '*.rs' -o -name '*.py' -o -name '*.pyi') \
+           Cargo.toml Cargo.lock pyproject.toml $(wildcard crates/*/Cargo.toml)
+
+.PHONY: demo test test-rust test-python lint docs wheel clean
+
+demo: $(VENV)/installed
+	$(BIN)/unsmear demo -o unsmear_demo
+
+test: test-rust test-python
+
+test-rust:
+	cargo test --workspace --locked --quiet
+
+test-python: $(VENV)/developed
+	$(BIN)/python -m pytest -q
+
+lint: $(VENV)/developed
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(BIN)/ruff format --check python tests benches scripts
+	$(BIN)/ruff check python tests benches scripts
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest unsmear._unsmear
+
+docs:
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+
+wheel: $(VENV)/tools
+	$(BIN)/maturin build --release --locked --quiet --out dist
+
+$(VENV)/tools:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check "maturin>=1.14,<2"
+	touch $@
+
+$(VENV)/installed: $(VENV)/tools $(SOURCES)
+	$(BIN)/pip install --quiet --disable-pip-version-check .
+	touch $@
+
+# The editable build with everything the tests need; it takes the place of `installed`.
+$(VENV)/developed: $(VENV)/tools $(SOURCES)
+	$(BIN)/maturin develop --release --locked --quiet --extras dev
+	touch $@ $(VENV)/installed
+
+clean:
+	rm -rf $(VENV) target dist unsmear_demo

@@ -1,0 +1,7 @@
+"""``python -m unsmear``."""
+
+import sys
+
+from unsmear.cli import main
+
+sys.exit(main())

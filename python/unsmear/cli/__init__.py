@@ -1,0 +1,61 @@
+"""The command line: ``unsmear VERB ...``, one module per verb.
+
+Exit status: 0 good, 1 failed (the reason is on standard error), 2 wrong usage. With
+``--json`` the result is one JSON document on standard output.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from unsmear import __version__
+from unsmear.cli import convert, deblur, demo, evaluate, flow, show
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_VERBS = (demo, flow, deblur, evaluate, show, convert)
+_FAILED, _INTERRUPTED = 1, 130
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all verbs."""
+    top = argparse.ArgumentParser(
+        prog="unsmear",
+        description="Measure motion in image sequences and remove the blur it leaves.",
+    )
+    top.add_argument("--version", action="version", version=f"unsmear {__version__}")
+    verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
+    for module in _VERBS:
+        name = module.__name__.rpartition(".")[2]
+        verb = verbs.add_parser(
+            name,
+            help=module.SUMMARY,
+            description=module.SUMMARY,
+            epilog=f"example:\n  {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(verb)
+        verb.add_argument(
+            "--json", action="store_true", help="print the result as JSON"
+        )
+        verb.set_defaults(run=module.run)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status."""
+    options = parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except KeyboardInterrupt:
+        print("unsmear: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:
+        return _FAILED
+    except (ValueError, TypeError, OSError, ImportError, MemoryError) as error:
+        print(f"unsmear: {error or type(error).__name__}", file=sys.stderr)
+        return _FAILED
+    return 0

@@ -1,0 +1,103 @@
+"""What several verbs share: sources of frames, method parameters, printing."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from unsmear._parameters import PARAMETERS
+from unsmear.sequences import read_frames
+
+if TYPE_CHECKING:
+    import argparse
+
+    from numpy.typing import NDArray
+
+FRAMES_HELP = "folder, glob in quotes, picture files, image stack or video"
+
+
+def add_frames(verb: argparse.ArgumentParser) -> None:
+    """Add the positional FRAMES."""
+    verb.add_argument("frames", nargs="+", metavar="FRAMES", help=FRAMES_HELP)
+
+
+def frames_of(options: argparse.Namespace) -> NDArray[Any]:
+    """Read FRAMES; one name may be a folder, a glob, a stack or a video."""
+    names: list[str] = options.frames
+    return read_frames(names[0] if len(names) == 1 else names)
+
+
+def channel_axis_of(frames: NDArray[Any]) -> int | None:
+    """Colour axis of frames as `read_frames` returns them."""
+    return 3 if frames.ndim == 4 else None
+
+
+def add_flow_method(verb: argparse.ArgumentParser, option: str, default: str) -> None:
+    """Add the choice of a flow method and its parameters."""
+    verb.add_argument(
+        option, choices=sorted(PARAMETERS), default=default, help=f"default {default}"
+    )
+    verb.add_argument(
+        "-p",
+        "--parameter",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of the flow method; may be repeated",
+    )
+
+
+def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Parse NAME=VALUE pairs; a value is JSON if it can be, else text."""
+    parameters = {}
+    for pair in options.parameter:
+        name, separator, text = pair.partition("=")
+        if not separator:
+            msg = f"--parameter must look like NAME=VALUE, got {pair!r}"
+            raise ValueError(msg)
+        try:
+            parameters[name] = json.loads(text)
+        except json.JSONDecodeError:
+            parameters[name] = text
+    return parameters
+
+
+def show_result(result: dict[str, Any], *, as_json: bool) -> None:
+    """Print a result: JSON, or one aligned line per entry."""
+    if as_json:
+        print(json.dumps(_plain(result), indent=2))
+        return
+    flat = dict(_flatten(result))
+    width = max(map(len, flat), default=0)
+    for name, value in flat.items():
+        print(f"{name:<{width}}  {_text(value)}")
+
+
+def _flatten(result: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    lines: list[tuple[str, Any]] = []
+    for name, value in result.items():
+        if isinstance(value, dict):
+            lines += _flatten(value, f"{prefix}{name} ")
+        else:
+            lines.append((f"{prefix}{name}", value))
+    return lines
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return "unknown" if math.isnan(value) else f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value)) or "none"
+    return str(value)
+
+
+def _plain(value: Any) -> Any:
+    """Replace what JSON cannot say (NaN, infinity) by null."""
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
