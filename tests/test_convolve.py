@@ -38,7 +38,9 @@ def test_unknown_samples_reach_their_window_and_no_further() -> None:
     volume = np.random.default_rng(1).normal(size=(1, 9, 80))
     clean = _unsmear.correlate_separable(volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect")
     volume[0, 4, 40] = np.nan
-    result = _unsmear.correlate_separable(volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect")
+    result = _unsmear.correlate_separable(
+        volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect"
+    )
     touched = np.zeros(volume.shape, dtype=bool)
     touched[0, 4, 39:42] = True
     np.testing.assert_array_equal(np.isnan(result), touched)
@@ -74,7 +76,9 @@ def test_strided_volumes_are_read_as_they_are() -> None:
     for view in (volume[::-1, ::2, ::-3], np.asfortranarray(volume), volume.T):
         before = view.copy()
         result = _unsmear.correlate_separable(view, taps, "reflect")
-        packed = _unsmear.correlate_separable(np.ascontiguousarray(view), taps, "reflect")
+        packed = _unsmear.correlate_separable(
+            np.ascontiguousarray(view), taps, "reflect"
+        )
         np.testing.assert_array_equal(result, packed)
         np.testing.assert_array_equal(view, before)
 

@@ -269,7 +269,7 @@ def test_complex_pictures_are_refused() -> None:
 
 
 def test_a_progress_callback_that_raises_ends_the_work() -> None:
-    def stop(done: int, total: int) -> None:
+    def stop(share: float) -> None:
         raise LookupError("enough")
 
     with pytest.raises(LookupError, match="enough"):

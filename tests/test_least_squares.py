@@ -70,7 +70,9 @@ def test_mirrored_and_transposed_scenes_move_accordingly() -> None:
 
 
 def test_no_motion_is_exactly_no_motion() -> None:
-    flow, confidence = estimate(moving_texture((0.0, 0.0), (4, 33, 41)), 1, double=False)
+    flow, confidence = estimate(
+        moving_texture((0.0, 0.0), (4, 33, 41)), 1, double=False
+    )
     np.testing.assert_array_equal(flow, 0.0)
     assert (confidence > 0).all()
 

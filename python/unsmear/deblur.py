@@ -10,13 +10,12 @@ import numpy as np
 from unsmear import _unsmear
 from unsmear._arrays import as_picture_array
 from unsmear._channels import Channels
+from unsmear._progress import of_steps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
-    Progress = Callable[[int, int], object] | None
+    from unsmear._progress import Progress
 
 METHODS = ("wiener", "thesis")
 
@@ -57,7 +56,7 @@ def deblur(
     regularization: float | None = None,
     degree: int = 4,
     channel_axis: int | None = None,
-    progress: Progress = None,
+    progress: Progress | None = None,
 ) -> DeblurResult:
     r"""Remove the motion blur that a known flow caused.
 
@@ -90,7 +89,7 @@ def deblur(
     channel_axis : int, optional
         Axis of 1 or 3 colour channels. Default: the picture is grey.
     progress : callable, optional
-        Called now and then as ``progress(done, total)``; what it raises ends the work.
+        Called with the share done in [0, 1]; an exception it raises cancels the call.
 
     Returns
     -------
@@ -163,7 +162,7 @@ def _wiener(
     exposure: float,
     noise: float | None,
     regularization: float | None,
-    progress: Progress,
+    progress: Progress | None,
 ) -> tuple[NDArray[Any], dict[str, Any]]:
     single = channels.array.itemsize == 4
     if regularization is not None:
@@ -174,7 +173,7 @@ def _wiener(
         float(exposure),
         None if noise is None else float(noise) / channels.scale,
         regularization,
-        progress,
+        of_steps(progress),
     )
     # From here on in the units of the picture that came.
     automatic = regularization is None
@@ -189,7 +188,7 @@ def _thesis(
     exposure: float,
     degree: int,
     regularization: float,
-    progress: Progress,
+    progress: Progress | None,
 ) -> tuple[NDArray[Any], dict[str, Any]]:
     if not (np.isfinite(exposure) and exposure > 0):
         raise ValueError(f"exposure must be finite and positive, got {exposure}")
@@ -200,7 +199,11 @@ def _thesis(
     planes, unknown = [], 0
     for plane in channels.array.astype(np.float64):
         restored, unknown = _unsmear.thesis_deblur(
-            plane, np.ascontiguousarray(motion), int(degree), regularization, progress
+            plane,
+            np.ascontiguousarray(motion),
+            int(degree),
+            regularization,
+            of_steps(progress),
         )
         planes.append(restored)
     report = {

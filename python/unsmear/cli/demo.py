@@ -29,7 +29,11 @@ EXAMPLE = "unsmear demo -o unsmear_demo"
 
 # The clip moves up to 5.3 px/frame, within half a wavelength of this frequency; a
 # narrow neighbourhood keeps the disc's outline.
-_FLOW: dict[str, Any] = {"method": "least-squares", "tuning_frequency": 0.09, "neighbourhood": 3.0}
+_FLOW: dict[str, Any] = {
+    "method": "least-squares",
+    "tuning_frequency": 0.09,
+    "neighbourhood": 3.0,
+}
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
