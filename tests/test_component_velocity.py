@@ -92,7 +92,13 @@ def test_reversed_time_reverses_the_components(temporal: str) -> None:
     if temporal == "velocity-tuned":
         # The filter for motion along k becomes the one for motion against it: its
         # response is the conjugate, at -k, the same constraint.
-        order = [*range(6), *range(11, 16), *range(6, 11), *range(19, 22), *range(16, 19)]
+        order = [
+            *range(6),
+            *range(11, 16),
+            *range(6, 11),
+            *range(19, 22),
+            *range(16, 19),
+        ]
         backward = type(backward)(
             *(np.asarray(part)[order] for part in vars(backward).values())
         )
@@ -132,7 +138,11 @@ def test_what_the_face_says_of_shapes_and_orientations() -> None:
         ((3, 8, 8), {"index": 3}, r"index must be in -3\.\.2, got 3"),
         ((3, 8, 8), {"temporal": "fourier"}, 'temporal must be .*, got "fourier"'),
         ((3, 8, 8), {"tau": 0.0}, "tau must be > 0 deviations, got 0"),
-        ((3, 8, 8), {"amplitude_fraction": 2.0}, r"amplitude_fraction must be in \[0, 1"),
+        (
+            (3, 8, 8),
+            {"amplitude_fraction": 2.0},
+            r"amplitude_fraction must be in \[0",
+        ),
         ((3, 8, 8), {"sigma": 2.0}, "component_velocities has no parameter 'sigma'"),
     ],
 )

@@ -136,7 +136,10 @@ def test_sparsification_keeps_the_surest_first() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: m.endpoint_error(np.zeros((2, 3)), field(0, 0)), "flow must have shape"),
+        (
+            lambda: m.endpoint_error(np.zeros((2, 3)), field(0, 0)),
+            "flow must have",
+        ),
         (lambda: m.endpoint_error(field(0, 0), field(0, 0, (3, 2))), "truth must have"),
         (
             lambda: m.flow_errors(field(0, 0), field(0, 0), np.ones((3, 2))),
@@ -152,8 +155,14 @@ def test_sparsification_keeps_the_surest_first() -> None:
             ),
             r"densities must be in \(0, 1\], got 1.5",
         ),
-        (lambda: m.psnr(np.zeros((2, 3)), np.zeros((3, 2))), "image and reference must"),
-        (lambda: m.psnr(np.zeros((0, 3)), np.zeros((0, 3))), "image and reference must"),
+        (
+            lambda: m.psnr(np.zeros((2, 3)), np.zeros((3, 2))),
+            "image and ref",
+        ),
+        (
+            lambda: m.psnr(np.zeros((0, 3)), np.zeros((0, 3))),
+            "image and ref",
+        ),
         (
             lambda: m.psnr(np.zeros((2, 3)), np.zeros((2, 3)), data_range=0),
             "data_range must be > 0, got 0",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear._arrays import as_picture_array
+from unsmear._arrays import as_real_array
 from unsmear._channels import Channels
 
 if TYPE_CHECKING:
@@ -38,8 +38,9 @@ class DeblurResult:
         Plain data (JSON-able): ``method``, ``exposure`` (frames), ``noise`` (standard
         deviation in the units of the input, None if not used), ``regularization``
         (the constant r, None if it followed noise and detail), ``reach`` (px), counts
-        of copied pixels (``unknown_pixels``, ``still_pixels``, ``too_long_pixels``), ``pixels``,
-        ``degree`` (method "thesis"), ``version``, ``warnings`` (list of str).
+        of copied pixels (``unknown_pixels``, ``still_pixels``, ``too_long_pixels``),
+        ``pixels``, ``degree`` (method "thesis"), ``version``, ``warnings`` (list of
+        str).
     """
 
     image: NDArray[Any]
@@ -82,7 +83,8 @@ def deblur(
     regularization : float, optional
         r > 0, constant over frequency, against the power :math:`|K|^2 \le 1` of the
         blur; then ``noise`` is not used. Default: from the noise and the strength of
-        the detail around each pixel ("wiener"), 0.02 as in the founding work ("thesis").
+        the detail around each pixel ("wiener"), 0.02 as in the founding work
+        ("thesis").
     degree : int, default 4
         Interpolation degree 1 to 4 of "thesis"; unused otherwise.
     channel_axis : int, optional
@@ -194,7 +196,7 @@ def _thesis(
     if degree not in (1, 2, 3, 4):
         raise ValueError(f"degree must be 1, 2, 3 or 4, got {degree!r}")
     channels.flow(flow)  # checks the shape; angles need all the precision that came
-    motion = exposure * np.asarray(as_picture_array(flow, "flow"), np.float64)
+    motion = exposure * np.asarray(as_real_array(flow, "flow")[0], np.float64)
     planes, unknown = [], 0
     for plane in channels.array.astype(np.float64):
         restored, unknown = _unsmear.thesis_deblur(

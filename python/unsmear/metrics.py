@@ -37,7 +37,9 @@ _DENSITIES = (1.0, 0.9, 0.7, 0.5, 0.3)
 def _map(name: str, flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     estimate, reference = as_flow(flow), as_flow(truth, "truth")
     if estimate.shape != reference.shape:
-        msg = f"truth must have the shape of flow {estimate.shape}, got {reference.shape}"
+        msg = (
+            f"truth must have the shape of flow {estimate.shape}, got {reference.shape}"
+        )
         raise ValueError(msg)
     return _unsmear.error_map(
         name, estimate.astype(np.float64), reference.astype(np.float64)
@@ -172,9 +174,7 @@ def sparsification(
     reference = as_flow(truth, "truth")
     order_by = as_floating(confidence, "confidence", np.float64)
     if order_by.shape != reference.shape[:2]:
-        msg = (
-            f"confidence must have shape {reference.shape[:2]}, got {order_by.shape}"
-        )
+        msg = f"confidence must have shape {reference.shape[:2]}, got {order_by.shape}"
         raise ValueError(msg)
     counts = ~np.isnan(reference).any(axis=-1) & _as_mask(mask, reference.shape[:2])
     aae, epe = angular_error(flow, truth), endpoint_error(flow, truth)
@@ -283,7 +283,7 @@ def _as_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_
     if array.shape != shape:
         msg = f"mask must have shape {shape}, got {array.shape}"
         raise ValueError(msg)
-    return array != 0
+    return np.asarray(array != 0)
 
 
 def _mean(values: NDArray[np.float64]) -> float:

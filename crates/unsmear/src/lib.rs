@@ -1,11 +1,26 @@
 //! Phase-based optical flow and pixel-by-pixel removal of motion blur.
 //!
-//! The modules in pipeline order; each uses only those above it.
+//! The modules in pipeline order; each uses only modules of lower rank.
 //!
-//! | module | concept |
-//! |---|---|
-//! | [`error`], [`real`], [`border`], [`control`] | failures, scalars, picture edges, cancellation |
-//! | [`flow_field`] | a field of motion |
+//! | rank | modules | concept |
+//! |---|---|---|
+//! | 0 | [`error`], [`real`] | failures; `f32` and `f64` |
+//! | 1 | [`border`], [`control`], [`flow_field`] | picture edges; cancellation; a field of motion |
+//! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
+//! | 3 | [`convolve`], [`fft_convolve`] | separable correlation; convolution with large kernels |
+//! | 4 | [`gabor`] | filters tuned to a wavevector, complex responses |
+//! | 5 | [`phase_gradient`], [`spatiotemporal`] | phase in space; filters in space and time |
+//! | 6 | [`component_velocity`] | what one filter sees of the motion, and its tests |
+//! | 7 | [`flow`] | an estimate of flow, with confidence |
+//! | 8 | `flow::affine`, `flow::constraint`, [`flow::standardize`] | parts of the flow methods |
+//! | 8 | [`flow::thesis::bank`], [`flow::thesis::components`], [`flow::thesis::gated_mean`] | parts of the founding method |
+//! | 9 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
+//! | 10 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
+//! | 11 | [`blur`] | the forward operator |
+//! | 12 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
+//! | 13 | [`deblur::wiener`], [`deblur::thesis`] | the deblurring methods |
+//! | 14 | [`deblur`] | their names |
+//! | 15 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
