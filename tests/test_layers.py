@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ LARGEST_ROOT = 150  # lib.rs, a table of contents
 # The core
 
 
+@cache
 def core_modules() -> dict[str, Path]:
     """Every module by its path in Rust."""
     modules = {}
@@ -38,6 +40,7 @@ def core_modules() -> dict[str, Path]:
     return modules
 
 
+@cache
 def ranks() -> dict[str, int]:
     """The table of ``lib.rs``: rank and modules in its first two columns."""
     table = {}
@@ -50,6 +53,7 @@ def ranks() -> dict[str, int]:
     return table
 
 
+@cache
 def code_of(path: Path) -> str:
     """The source without comments and without its tests."""
     source = path.read_text("utf-8").split("#[cfg(test)]\nmod tests")[0]
@@ -110,6 +114,7 @@ def test_the_core_is_pure() -> None:
 # The package
 
 
+@cache
 def package_modules() -> dict[str, Path]:
     """Every Python module by its dotted name; the compiled core by its stub."""
     modules = {"unsmear._unsmear": PACKAGE / "_unsmear.pyi"}
@@ -119,8 +124,10 @@ def package_modules() -> dict[str, Path]:
     return modules
 
 
-def imports(name: str, modules: dict[str, Path]) -> set[str]:
+@cache
+def imports(name: str) -> frozenset[str]:
     """Modules of the package that ``name`` imports, anywhere, at run time."""
+    modules = package_modules()
     path = modules[name]
     tree = ast.parse(path.read_text("utf-8"))
     for node in ast.walk(tree):
@@ -136,7 +143,7 @@ def imports(name: str, modules: dict[str, Path]) -> set[str]:
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
                 found.add(inner if inner in modules else str(node.module))
-    return (found & modules.keys()) - {name}
+    return frozenset(found & modules.keys()) - {name}
 
 
 def layer(name: str) -> int:
@@ -153,28 +160,25 @@ def layer(name: str) -> int:
 
 @pytest.mark.parametrize("name", package_modules())
 def test_python_modules_do_not_import_upward(name: str) -> None:
-    modules = package_modules()
-    upward = {used for used in imports(name, modules) if layer(used) > layer(name)}
-    # A package's own parts and, below it, its siblings are one layer.
+    upward = {used for used in imports(name) if layer(used) > layer(name)}
     assert not upward, f"{name} imports {sorted(upward)}"
 
 
 def test_python_modules_import_in_no_circle() -> None:
-    modules = package_modules()
     done: set[str] = set()
 
     def visit(name: str, path: tuple[str, ...]) -> None:
         assert name not in path, " -> ".join([*path, name])
         if name not in done:
-            for used in imports(name, modules):
+            for used in imports(name):
                 # A package imports its parts, and they each other through it.
                 if not name.startswith(f"{used}."):
                     visit(used, (*path, name))
             done.add(name)
 
-    for name in modules:
+    for name in package_modules():
         visit(name, ())
-    assert {"unsmear._unsmear", "unsmear._arrays"} <= imports("unsmear.flow", modules)
+    assert {"unsmear._unsmear", "unsmear._arrays"} <= imports("unsmear.flow")
 
 
 # Sizes

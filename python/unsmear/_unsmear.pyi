@@ -31,6 +31,7 @@ __all__ = [
     "motion_psf",
     "optimized",
     "psnr",
+    "sample",
     "set_num_threads",
     "ssim",
     "thesis_bank",
@@ -144,6 +145,12 @@ def thesis_gated_mean(
 ) -> tuple[_Double, _Double]: ...
 def thesis_flow(
     frames: _Double, parameters: _Parameters, *, progress: _Progress | None = None
+) -> _Double: ...
+
+# Pictures between pixels.
+
+def sample(
+    picture: _Double, y: _Double, x: _Double, degree: int, border: str
 ) -> _Double: ...
 
 # Blur, deblurring and their kernels.

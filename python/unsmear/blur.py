@@ -72,7 +72,7 @@ def blur(
     >>> import numpy as np, unsmear
     >>> edge = np.repeat([[0.0, 1.0]], 4, axis=0).repeat(4, axis=1)
     >>> flow = np.full((4, 8, 2), (4.0, 0.0))
-    >>> unsmear.blur(edge, flow)[0].round(1)
+    >>> unsmear.blur(edge, flow)[0].round(1) + 0.0
     array([0. , 0. , 0.1, 0.4, 0.6, 0.9, 1. , 1. ])
     """
     channels = Channels(image, channel_axis)

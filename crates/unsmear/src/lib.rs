@@ -16,8 +16,8 @@
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
 //! | 9 | [`flow::thesis::bank`], [`flow::thesis::components`], [`flow::thesis::gated_mean`] | parts of the founding method |
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
-//! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
-//! | 12 | [`blur`] | the forward operator |
+//! | 11 | [`psf`], `streamline`, `local_spline`, `spline_filter`, [`noise`] | kernels and paths of motion; sampling; noise |
+//! | 12 | [`interpolate`], [`blur`] | pictures between pixels, warping; the forward operator |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
@@ -42,6 +42,7 @@ pub mod flow;
 pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
+pub mod interpolate;
 mod local_spline;
 pub mod metrics;
 pub mod noise;
@@ -50,6 +51,7 @@ pub mod phase_rate;
 pub mod psf;
 pub mod real;
 pub mod spatiotemporal;
+mod spline_filter;
 mod streamline;
 
 pub use border::Border;
@@ -57,4 +59,5 @@ pub use control::Control;
 pub use convolve::{correlate_axis, correlate_separable, gaussian_taps};
 pub use error::{Error, Result};
 pub use flow_field::{FlowField, FlowView};
+pub use interpolate::{SplineDegree, SplineImage};
 pub use real::Real;
