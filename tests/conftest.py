@@ -32,9 +32,7 @@ def test_data() -> Callable[[str], Path]:
     def item(name: str) -> Path:
         path = folder / name
         if not path.exists():
-            pytest.skip(
-                f"no real data at {path}; name their folder by UNSMEAR_TEST_DATA"
-            )
+            pytest.skip(f"no real data at {path}; UNSMEAR_TEST_DATA names their folder")
         return path
 
     return item

@@ -141,7 +141,7 @@ def test_what_the_face_says_of_shapes_and_orientations() -> None:
         (
             (3, 8, 8),
             {"amplitude_fraction": 2.0},
-            r"amplitude_fraction must be in \[0, 1",
+            r"amplitude_fraction must be in \[0",
         ),
         ((3, 8, 8), {"sigma": 2.0}, "component_velocities has no parameter 'sigma'"),
     ],

@@ -10,6 +10,7 @@ from reference.convolve import separable_3d
 from unsmear import _unsmear
 
 ONE = [1.0]
+correlate = _unsmear.correlate_separable
 
 
 def test_an_impulse_answers_with_the_mirrored_taps_on_its_axis() -> None:
@@ -18,7 +19,7 @@ def test_an_impulse_answers_with_the_mirrored_taps_on_its_axis() -> None:
     taps = [1.0, -2.0, 5.0]
     for axis, along in enumerate(np.eye(3, dtype=bool)):
         each = [taps if here else ONE for here in along]
-        response = _unsmear.correlate_separable(impulse, each, "zero")
+        response = correlate(impulse, each, "zero")
         line = np.moveaxis(response, axis, -1)[*(np.array([2, 3, 4])[~along])]
         centre = (2, 3, 4)[axis]
         np.testing.assert_array_equal(line[centre - 1 : centre + 2], taps[::-1])
@@ -30,17 +31,15 @@ def test_a_constant_stays_constant(border: str) -> None:
     taps = [0.25, 0.5, 0.25]
     volume = np.full((2, 3, 70), 3.0)
     # Powers of two: exact.
-    result = _unsmear.correlate_separable(volume, [taps, taps, taps], border)
+    result = correlate(volume, [taps, taps, taps], border)
     np.testing.assert_array_equal(result, volume)
 
 
 def test_unknown_samples_reach_their_window_and_no_further() -> None:
     volume = np.random.default_rng(1).normal(size=(1, 9, 80))
-    clean = _unsmear.correlate_separable(volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect")
+    clean = correlate(volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect")
     volume[0, 4, 40] = np.nan
-    result = _unsmear.correlate_separable(
-        volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect"
-    )
+    result = correlate(volume, [ONE, ONE, [1.0, 2.0, 3.0]], "reflect")
     touched = np.zeros(volume.shape, dtype=bool)
     touched[0, 4, 39:42] = True
     np.testing.assert_array_equal(np.isnan(result), touched)
@@ -63,7 +62,7 @@ def test_any_volume_matches_the_twin(
     rng = np.random.default_rng(seed)
     volume = rng.normal(size=shape)
     taps = [rng.normal(size=size) for size in sizes]
-    result = _unsmear.correlate_separable(volume, [t.tolist() for t in taps], border)
+    result = correlate(volume, [t.tolist() for t in taps], border)
     expected = separable_3d(volume, *taps, border)
     # At most 13^3 products of values of order 1, in the same order along each axis.
     scale = np.prod([np.abs(t).sum() for t in taps]) * np.abs(volume).max()
@@ -75,10 +74,8 @@ def test_strided_volumes_are_read_as_they_are() -> None:
     taps = [[1.0, 2.0, 4.0]] * 3
     for view in (volume[::-1, ::2, ::-3], np.asfortranarray(volume), volume.T):
         before = view.copy()
-        result = _unsmear.correlate_separable(view, taps, "reflect")
-        packed = _unsmear.correlate_separable(
-            np.ascontiguousarray(view), taps, "reflect"
-        )
+        result = correlate(view, taps, "reflect")
+        packed = correlate(np.ascontiguousarray(view), taps, "reflect")
         np.testing.assert_array_equal(result, packed)
         np.testing.assert_array_equal(view, before)
 
@@ -86,8 +83,8 @@ def test_strided_volumes_are_read_as_they_are() -> None:
 def test_bad_arguments_are_named() -> None:
     volume = np.zeros((1, 2, 3))
     with pytest.raises(ValueError, match=r"border must be .*, got \"mirror\""):
-        _unsmear.correlate_separable(volume, [ONE, ONE, ONE], "mirror")
+        correlate(volume, [ONE, ONE, ONE], "mirror")
     with pytest.raises(ValueError, match="taps must be an odd number of values, got 2"):
-        _unsmear.correlate_separable(volume, [ONE, [1.0, 1.0], ONE], "zero")
+        correlate(volume, [ONE, [1.0, 1.0], ONE], "zero")
     with pytest.raises(ValueError, match="taps must be an odd number of values, got 0"):
-        _unsmear.correlate_separable(volume, [ONE, [], ONE], "zero")
+        correlate(volume, [ONE, [], ONE], "zero")

@@ -72,7 +72,7 @@ def test_no_motion_is_exactly_no_motion_and_blank_frames_are_unknown() -> None:
 
 
 def test_an_expansion_is_followed_by_the_affine_model() -> None:
-    """A dilation by 1 % per frame: flow 0.01 (x - x0), which no mean over a window is."""
+    """Dilation by 1 % per frame, flow 0.01 (x - x0): not its mean over a window."""
     rng = np.random.default_rng(4)
     angle, phase = rng.uniform(0, 2 * np.pi, (2, 150))
     length = rng.uniform(1.0, 2.0, 150)

@@ -74,8 +74,8 @@ def test_mirrored_pictures_answer_mirrored_filters(
     in_y = respond(picture[::-1], **given)[:, ::-1]
     for filter_ in range(orientations):
         mirror = -filter_ % orientations
-        # (kx, ky) -> (-kx, ky) is the filter at pi - theta, on the axis x its conjugate;
-        # (kx, -ky) is the conjugate of that. Rounding of 25 x 25 products of order 1.
+        # (-kx, ky) is the filter at pi - theta, or on the x axis its own conjugate, and
+        # (kx, -ky) the conjugate of that. Rounding of 25 x 25 products of order 1.
         expected = plain[mirror] if filter_ else plain[0].conj()
         np.testing.assert_allclose(in_x[filter_], expected, atol=1e-13)
         expected = plain[mirror].conj() if filter_ else plain[0]

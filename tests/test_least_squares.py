@@ -129,8 +129,9 @@ def test_flow_matches_the_twin(
     np.testing.assert_array_equal(np.isnan(flow), np.isnan(expected))
     # Rounding of sums, 1e-15, over the least eigenvalue that counts, 1e-3 (and 1e-6 of
     # the scale where the pixel stands alone), through the reweighted passes.
-    # On the line of symmetry of a mirrored border a response is real, its phase jumps by
-    # half a turn and rounding chooses the sign; C^8 leaves such pixels 0.4 % of a say.
+    # On the line of symmetry of a mirrored border a response is real, its phase jumps
+    # by half a turn and rounding chooses the sign; C^8 leaves such pixels 0.4 % of a
+    # say.
     bound = 1e-4 if given.get("border") == "reflect" else 1e-9
     np.testing.assert_allclose(flow, expected, rtol=0, atol=bound)
     np.testing.assert_allclose(confidence, sure, rtol=0, atol=bound)
@@ -141,8 +142,8 @@ def test_flow_matches_the_twin(
     assert (known != np.isfinite(expected[..., 0])).sum() <= 1
     held = known & (sure > 0.05)
     error = np.abs(single - expected)[held]
-    # 1e-7 per sample over eigenvalues of 0.01 and more: 1e-5; a few 1e-4 where a wrapped
-    # phase gives the reweighting a near tie.
+    # 1e-7 per sample over eigenvalues of 0.01 and more: 1e-5; a few 1e-4 where a
+    # wrapped phase gives the reweighting a near tie.
     assert error.size == 0 or error.max() < 5e-4
     if min(shape[1:]) > 15:
         assert held.mean() > 0.3

@@ -138,7 +138,7 @@ def test_sparsification_keeps_the_surest_first() -> None:
     [
         (
             lambda: m.endpoint_error(np.zeros((2, 3)), field(0, 0)),
-            "flow must have shape",
+            "flow must have",
         ),
         (lambda: m.endpoint_error(field(0, 0), field(0, 0, (3, 2))), "truth must have"),
         (
@@ -157,11 +157,11 @@ def test_sparsification_keeps_the_surest_first() -> None:
         ),
         (
             lambda: m.psnr(np.zeros((2, 3)), np.zeros((3, 2))),
-            "image and reference must",
+            "image and ref",
         ),
         (
             lambda: m.psnr(np.zeros((0, 3)), np.zeros((0, 3))),
-            "image and reference must",
+            "image and ref",
         ),
         (
             lambda: m.psnr(np.zeros((2, 3)), np.zeros((2, 3)), data_range=0),

@@ -100,10 +100,8 @@ def test_pictures_of_one_line_have_the_tuned_gradient_across(
     _, phi_x, phi_y = gradient(rng.normal(size=shape))
     centres = gabor.wavevectors(0.15, 6)
     # One sample says nothing of the change along its axis: the carrier's own remains.
-    for size, phi, k in (
-        (shape[1], phi_x, centres[:, 0]),
-        (shape[0], phi_y, centres[:, 1]),
-    ):
+    sides = ((shape[1], phi_x, centres[:, 0]), (shape[0], phi_y, centres[:, 1]))
+    for size, phi, k in sides:
         assert phi.shape == (6, *shape)
         assert not np.isnan(phi).any()
         if size == 1:

@@ -61,7 +61,7 @@ def scale_of(dtype: np.dtype[Any]) -> float:
 def as_floating(
     array: ArrayLike, argument: str, dtype: type[Floating]
 ) -> NDArray[Floating]:
-    """Return ``array`` as packed ``dtype``; integers divided by their type's maximum."""
+    """Return ``array`` as packed ``dtype``, integers divided by the type's maximum."""
     picture = as_picture_array(array, argument)
     scale = scale_of(picture.dtype)
     if scale == 1.0:
@@ -70,7 +70,7 @@ def as_floating(
 
 
 def to_dtype_of(result: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
-    """Return ``result`` (scaled as `as_floating` does) in the type and range of ``like``.
+    """Return ``result`` (scaled like `as_floating`) in type and range of ``like``.
 
     Integers are rounded and clipped; a NaN, which an integer cannot say, is refused.
     """
@@ -145,7 +145,7 @@ def luma(colour: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def as_flow(flow: ArrayLike, argument: str = "flow") -> NDArray[np.float32]:
-    """Return a flow field (H, W, 2) as packed float32; integers are px, never scaled."""
+    """Return a flow field (H, W, 2) as packed float32, integers unscaled."""
     array, _ = as_real_array(flow, argument)
     if array.ndim != 3 or array.shape[-1] != 2:
         msg = f"{argument} must have shape (H, W, 2), got {array.shape}"

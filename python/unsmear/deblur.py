@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear._arrays import as_picture_array
+from unsmear._arrays import as_real_array
 from unsmear._channels import Channels
 from unsmear._progress import of_steps
 
@@ -195,7 +195,7 @@ def _thesis(
     if degree not in (1, 2, 3, 4):
         raise ValueError(f"degree must be 1, 2, 3 or 4, got {degree!r}")
     channels.flow(flow)  # checks the shape; angles need all the precision that came
-    motion = exposure * np.asarray(as_picture_array(flow, "flow"), np.float64)
+    motion = exposure * np.asarray(as_real_array(flow, "flow")[0], np.float64)
     planes, unknown = [], 0
     for plane in channels.array.astype(np.float64):
         restored, unknown = _unsmear.thesis_deblur(

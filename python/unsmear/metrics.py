@@ -283,7 +283,7 @@ def _as_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_
     if array.shape != shape:
         msg = f"mask must have shape {shape}, got {array.shape}"
         raise ValueError(msg)
-    return array != 0
+    return np.asarray(array != 0)
 
 
 def _mean(values: NDArray[np.float64]) -> float:

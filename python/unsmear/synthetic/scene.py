@@ -64,7 +64,7 @@ class Layer:
     def at(
         self, time: float, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values (H, W[, C]) and opacities (H, W) of picture points (H, W, 2)."""
+        """Return values (H, W[, C]) and opacities (H, W) at points (H, W, 2)."""
         scene = self.scene_points(time, points)
         height, width = self.texture.shape[:2]
         x = np.ascontiguousarray(scene[..., 0] + (width - 1) / 2)
@@ -151,5 +151,5 @@ class Scene:
             moved[own] = layer.displacement(points, start, end)[own]
         landed = points + moved
         limit = np.array(self.shape[::-1]) / 2.0
-        inside: NDArray[np.bool_] = (np.abs(landed) <= limit).all(axis=-1)
+        inside = np.asarray((np.abs(landed) <= limit).all(axis=-1))
         return moved, inside & (self.front(end, landed) == front)
