@@ -26,7 +26,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ndarray::ArrayView2;
+use ndarray::{Array4, ArrayView2};
 
 use crate::array::{for_each_row, for_each_row_with};
 use crate::border::Border;
@@ -315,6 +315,14 @@ impl<T: Real> Responses<T> {
         (self.filters, self.height, self.width)
     }
 
+    /// Real and imaginary parts of all responses, (2, N, H, W), nothing copied: in memory the rows
+    /// of all filters lie side by side, (H, N, 2, W).
+    #[must_use]
+    pub fn into_array(self) -> Array4<T> {
+        let shape = (self.height, self.filters, 2, self.width);
+        Array4::from_shape_vec(shape, self.data).unwrap_or_default().permuted_axes([2, 1, 0, 3])
+    }
+
     /// Real and imaginary parts of row `y` of filter `filter`.
     #[inline]
     #[must_use]
@@ -411,6 +419,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn as_an_array_every_sample_keeps_its_place() {
+        let mut responses = Responses::<f32>::zeros(3, 4, 5);
+        responses.row_mut(2, 1).1[4] = 7.0;
+        let array = responses.into_array();
+        assert_eq!((array.shape(), array[(1, 2, 1, 4)]), (&[2, 3, 4, 5][..], 7.0));
+        assert_eq!(array.sum(), 7.0);
     }
 
     #[test]
