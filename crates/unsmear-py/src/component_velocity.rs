@@ -96,6 +96,38 @@ where
     ))
 }
 
+/// What the bank makes of a picture, without a copy: real and imaginary parts (2, N, H, W); `phi_x`,
+/// `phi_y` and squared amplitude (3, N, H, W), in the precision of the picture.
+#[pyfunction]
+pub(crate) fn gabor_planes<'py>(
+    py: Python<'py>,
+    picture: &Bound<'py, PyAny>,
+    parameters: parameters::Bank,
+) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
+    if let Ok(single) = picture.extract::<PyReadonlyArray2<'py, f32>>() {
+        return planes(py, &single, &parameters);
+    }
+    planes(py, &picture.extract::<PyReadonlyArray2<'py, f64>>()?, &parameters)
+}
+
+fn planes<T: Real + Element>(
+    py: Python<'_>,
+    picture: &PyReadonlyArray2<'_, T>,
+    parameters: &parameters::Bank,
+) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
+    let border = parameters.border()?;
+    let bank = GaborBank::<T>::new(&parameters.gabor()).map_err(|e| to_python(&e))?;
+    let picture = picture.as_array();
+    let (responses, gradient) = run(py, None, |control| {
+        let responses = bank.respond(picture, border, control)?;
+        let gradient = PhaseGradient::new(&responses, bank.wavevectors(), control)?;
+        Ok((responses.into_array(), gradient.into_array()))
+    })?;
+    let [responses, gradient] =
+        [responses, gradient].map(|planes| planes.into_pyarray(py).into_any().unbind());
+    Ok((responses, gradient))
+}
+
 fn cube_to_python<T: Element>(
     py: Python<'_>,
     shape: (usize, usize, usize),

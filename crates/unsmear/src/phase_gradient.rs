@@ -21,6 +21,7 @@
 //! section 3. The founding method differentiates `R` itself with zeros beyond the edge.
 
 use multiversion::multiversion;
+use ndarray::Array4;
 
 use crate::array::for_each_row_with;
 use crate::control::Control;
@@ -90,6 +91,16 @@ impl<T: Real> PhaseGradient<T> {
             },
         )?;
         Ok(Self { data, filters, width })
+    }
+
+    /// `phi_x`, `phi_y` and squared amplitude of all responses, (3, N, H, W), nothing copied: in
+    /// memory the rows of all filters lie side by side, (H, N, 3, W).
+    #[must_use]
+    pub fn into_array(self) -> Array4<T> {
+        let row = 3 * self.filters * self.width;
+        let height = self.data.len().checked_div(row).unwrap_or(0);
+        let shape = (height, self.filters, 3, self.width);
+        Array4::from_shape_vec(shape, self.data).unwrap_or_default().permuted_axes([2, 1, 0, 3])
     }
 
     /// Row `y` of filter `filter`.
@@ -263,6 +274,9 @@ mod tests {
                     assert!((row.power[x] - 9.0).abs() < 1e-13);
                 }
             }
+            let array = gradient.into_array();
+            assert_eq!(array.shape(), [3, 1, height, width]);
+            assert!((array[(1, 0, height - 1, width - 1)] - tuned[1]).abs() < 1e-13);
         }
     }
 
