@@ -1,4 +1,4 @@
-"""Image sequences with exact truth: flow, velocity, visibility, sharp and blurred frames.
+"""Image sequences with exact truth: flow, velocity, visibility, sharp frames.
 
 A scene is a stack of textures (`scene`), each moved by an affine motion given as a
 function of time (`motion`); a sequence is that scene seen at whole times, and exposed

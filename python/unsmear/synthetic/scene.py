@@ -48,8 +48,7 @@ class Layer:
         self.texture = as_floating(texture, "texture", np.float64)
         if self.texture.ndim not in (2, 3) or self.texture.size == 0:
             msg = (
-                "texture must have shape (H, W) or (H, W, C), "
-                f"got {self.texture.shape}"
+                f"texture must have shape (H, W) or (H, W, C), got {self.texture.shape}"
             )
             raise ValueError(msg)
         self.opacity: NDArray[np.float64] | None = None
@@ -65,7 +64,7 @@ class Layer:
     def at(
         self, time: float, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values (H, W[, C]) and opacities (H, W) of picture points (H, W, 2)."""
+        """Return values (H, W[, C]) and opacities (H, W) at points (H, W, 2)."""
         scene = self.scene_points(time, points)
         height, width = self.texture.shape[:2]
         x = np.ascontiguousarray(scene[..., 0] + (width - 1) / 2)
@@ -74,7 +73,11 @@ class Layer:
         values = np.stack(
             [
                 _unsmear.sample(
-                    np.ascontiguousarray(planes[..., c]), y, x, _TEXTURE_DEGREE, "reflect"
+                    np.ascontiguousarray(planes[..., c]),
+                    y,
+                    x,
+                    _TEXTURE_DEGREE,
+                    "reflect",
                 )
                 for c in range(planes.shape[-1])
             ],
@@ -148,5 +151,5 @@ class Scene:
             moved[own] = layer.displacement(points, start, end)[own]
         landed = points + moved
         limit = np.array(self.shape[::-1]) / 2.0
-        inside: NDArray[np.bool_] = (np.abs(landed) <= limit).all(axis=-1)
+        inside = np.asarray((np.abs(landed) <= limit).all(axis=-1))
         return moved, inside & (self.front(end, landed) == front)

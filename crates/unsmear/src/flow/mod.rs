@@ -14,6 +14,7 @@ pub(crate) mod affine;
 pub(crate) mod constraint;
 pub mod fleet_jepson;
 pub mod least_squares;
+mod normal_equations;
 pub mod standardize;
 pub mod thesis;
 
