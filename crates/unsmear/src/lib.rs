@@ -22,10 +22,14 @@ pub mod flow;
 pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
+pub mod immerkaer_noise;
+pub mod median;
 pub mod metrics;
 pub mod phase_gradient;
 pub mod real;
+pub mod sor;
 pub mod spatiotemporal;
+pub mod weighted_median;
 
 pub use border::Border;
 pub use control::Control;
