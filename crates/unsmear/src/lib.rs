@@ -23,12 +23,15 @@ pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
 pub mod immerkaer_noise;
+pub mod interpolate;
 pub mod median;
 pub mod metrics;
 pub mod phase_gradient;
+pub mod pyramid;
 pub mod real;
 pub mod sor;
 pub mod spatiotemporal;
+mod spline_filter;
 pub mod weighted_median;
 
 pub use border::Border;
