@@ -9,7 +9,7 @@ use crate::threads::run;
 
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Items {
+pub(crate) struct Items {
     pyramid_factor: f64,
     coarsest_side: f64,
     finest_level: usize,
@@ -61,11 +61,11 @@ pub(crate) fn coarse_to_fine(
         guide_sigma: parameters.guide_sigma,
         frames_each_side: parameters.frames_each_side,
     };
-    let _ = mask;
     let sequence = Sequence {
         frames: frames.as_array(),
         index,
-        guide: guide.as_ref().map(|g| g.as_array()),
+        guide: guide.as_ref().map(PyReadonlyArray3::as_array),
+        mask: mask.as_ref().map(PyReadonlyArray2::as_array),
     };
     let estimate = run(py, progress, |control| method.estimate(&sequence, control))?;
     let flow = flow_to_python(py, estimate.flow).into_any().unbind();

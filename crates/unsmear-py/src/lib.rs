@@ -7,10 +7,13 @@ mod arrays;
 mod coarse_to_fine;
 mod component_velocity;
 mod convolve;
+mod deblur;
 mod errors;
 mod flow;
+mod interpolate;
 mod metrics;
 mod parameters;
+mod psf;
 mod thesis;
 mod threads;
 
@@ -24,9 +27,15 @@ mod _unsmear {
     #[pymodule_export]
     use crate::convolve::correlate_separable;
     #[pymodule_export]
+    use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
+    #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
     #[pymodule_export]
+    use crate::interpolate::sample;
+    #[pymodule_export]
     use crate::metrics::{error_map, psnr, ssim};
+    #[pymodule_export]
+    use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]
     use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! Convolution of pictures with a kernel as large as themselves, by zero-padded transforms.
+//! Convolution with large kernels by zero-padded transforms.
 //!
 //! For pictures and kernels of one shape (H, W), the full convolution
 //!
@@ -14,6 +14,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
+use crate::border::Border;
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::fourier::{Complex64, LinePlan, transpose_into};
@@ -145,6 +146,45 @@ impl FftConvolver {
     }
 }
 
+/// 'Same' convolution of a picture (H, W) with a smaller or larger real kernel, `border` continuing
+/// the picture: `f(y, x) = sum_{j, i} g(j, i) I(y + c - j, x + d - i)` with the kernel's middle
+/// `(c, d) = (floor(h/2), floor(w/2))` for a kernel (h, w).
+///
+/// Cheaper than the direct sum from about 15 x 15 taps on; separable kernels are better served by
+/// [`crate::convolve`].
+///
+/// # Errors
+/// [`Error::Shape`] when either is empty, [`Error::Cancelled`].
+pub fn fft_convolve(
+    picture: ArrayView2<'_, f64>,
+    kernel: ArrayView2<'_, f64>,
+    border: Border,
+    control: &Control,
+) -> Result<Array2<f64>> {
+    for (argument, array) in [("picture", &picture), ("kernel", &kernel)] {
+        if array.is_empty() {
+            return Err(Error::shape(argument, "(H >= 1, W >= 1)", array.shape()));
+        }
+    }
+    let ((height, width), (h, w)) = (picture.dim(), kernel.dim());
+    // Room for what the kernel sees beyond the edges; then one shape for both.
+    let shape = (height + h - 1, width + w - 1);
+    let [top, left] = [h - 1 - h / 2, w - 1 - w / 2];
+    let at = |y: usize, before: usize, n: usize| border.index(y as isize - before as isize, n);
+    let continued =
+        Array2::from_shape_fn(shape, |(y, x)| match (at(y, top, height), at(x, left, width)) {
+            (Some(y), Some(x)) => picture[(y, x)],
+            _ => 0.0,
+        });
+    let padded = Array2::from_shape_fn(shape, |at| kernel.get(at).copied().unwrap_or(0.0));
+    let plan = FftConvolver::new(shape.0, shape.1, [h - 1, w - 1])?;
+    let mut scratch = FftScratch::default();
+    let picture = plan.spectrum(continued.view(), &mut scratch, control)?;
+    let kernel = plan.spectrum(padded.view(), &mut scratch, control)?;
+    let full = plan.convolve(&picture, &kernel, &mut scratch, control)?;
+    Ok(Array2::from_shape_fn((height, width), |at| full[at].re))
+}
+
 fn refill(buffer: &mut Vec<Complex64>, length: usize) {
     buffer.clear();
     buffer.resize(length, Complex64::default());
@@ -186,5 +226,31 @@ mod tests {
             }
         }
         assert!(FftConvolver::new(4, 4, [5, 0]).is_err());
+    }
+
+    #[test]
+    fn same_convolution_follows_every_border_rule() {
+        let picture = Array2::from_shape_fn((7, 9), |(y, x)| ((5 * y + 3 * x) as f64 * 0.7).cos());
+        for (h, w) in [(1, 1), (3, 5), (4, 2), (9, 11)] {
+            let kernel = Array2::from_shape_fn((h, w), |(j, i)| 1.0 + j as f64 - 0.3 * i as f64);
+            for border in [Border::Replicate, Border::Reflect, Border::Zero] {
+                let got = fft_convolve(picture.view(), kernel.view(), border, &Control::new());
+                let got = got.unwrap();
+                for ((y, x), got) in got.indexed_iter() {
+                    let mut sum = 0.0;
+                    for ((j, i), tap) in kernel.indexed_iter() {
+                        let row = border.index((y + h / 2) as isize - j as isize, 7);
+                        let column = border.index((x + w / 2) as isize - i as isize, 9);
+                        if let (Some(row), Some(column)) = (row, column) {
+                            sum += tap * picture[(row, column)];
+                        }
+                    }
+                    // Up to 99 taps of up to 10: transforms round at 1e-16 of their total.
+                    assert!((got - sum).abs() < 1e-11, "{h}x{w} {border:?} at {y}, {x}");
+                }
+            }
+        }
+        let empty = Array2::zeros((0, 3));
+        assert!(fft_convolve(picture.view(), empty.view(), Border::Zero, &Control::new()).is_err());
     }
 }

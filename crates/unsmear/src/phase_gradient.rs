@@ -15,7 +15,7 @@
 //!
 //! On a plane wave at `k + d` this gives `k + d - d^5 / 30 + ...`. Beyond the edge of the picture
 //! `z` goes on in a straight line. In time the slope comes from the filter itself (see
-//! [`crate::temporal`]): [`rate_of_phase`].
+//! [`crate::spatiotemporal`]), or phases are compared: [`crate::phase_rate`].
 //!
 //! NaN where `R = 0`, which has no phase. Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772),
 //! section 3. The founding method differentiates `R` itself with zeros beyond the edge.
@@ -26,6 +26,7 @@ use crate::array::for_each_row_with;
 use crate::control::Control;
 use crate::error::Result;
 use crate::gabor::Responses;
+use crate::phase_rate::{ComplexRow, square};
 use crate::real::Real;
 
 /// Reach of the derivative, px.
@@ -102,23 +103,6 @@ impl<T: Real> PhaseGradient<T> {
     }
 }
 
-/// `Im(conj(R) dR) / |R|^2 + offset` for a row: the rate of phase along the direction in which `dR`
-/// is the (demodulated) derivative; NaN where `R = 0`.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn rate_of_phase<T: Real>(
-    [re, im]: [&[T]; 2],
-    [d_re, d_im]: [&[T]; 2],
-    power: &[T],
-    offset: T,
-    out: &mut [T],
-) {
-    let n = out.len();
-    let (re, im, d_re, d_im, power) = (&re[..n], &im[..n], &d_re[..n], &d_im[..n], &power[..n]);
-    for x in 0..n {
-        out[x] = (re[x] * d_im[x] - im[x] * d_re[x]) / power[x] + offset;
-    }
-}
-
 /// The demodulating derivative along one axis: weights `w_n exp(-i k n)`.
 #[derive(Debug, Clone)]
 struct Stencil<T> {
@@ -126,23 +110,6 @@ struct Stencil<T> {
     cosines: [T; 4],
     sines: [T; 4],
 }
-
-/// `arg(conj(R) R')` of a row: the phase advance from one frame to the next, rad in (-pi, pi].
-///
-/// Exact for any uniform shift below half a wavelength; exactly 0 for equal responses.
-pub fn phase_step<T: Real>(first: ComplexRow<'_, T>, second: ComplexRow<'_, T>, out: &mut [T]) {
-    let n = out.len();
-    let ((a_re, a_im), (b_re, b_im)) = (first, second);
-    let (a_re, a_im, b_re, b_im) = (&a_re[..n], &a_im[..n], &b_re[..n], &b_im[..n]);
-    for x in 0..n {
-        let across = a_re[x] * b_im[x] - a_im[x] * b_re[x];
-        let along = a_re[x] * b_re[x] + a_im[x] * b_im[x];
-        out[x] = across.atan2(along);
-    }
-}
-
-/// Real and imaginary part of a row.
-pub type ComplexRow<'a, T> = (&'a [T], &'a [T]);
 
 impl<T: Real> Stencil<T> {
     fn new(wavenumber: f64) -> Self {
@@ -263,16 +230,6 @@ fn demodulated_rate<T: Real>(
     }
 }
 
-/// `out = re^2 + im^2`.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn square<T: Real>(re: &[T], im: &[T], out: &mut [T]) {
-    let n = out.len();
-    let (re, im) = (&re[..n], &im[..n]);
-    for x in 0..n {
-        out[x] = re[x] * re[x] + im[x] * im[x];
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -329,14 +286,5 @@ mod tests {
         assert!(
             gradient.row(0, 2).phi_x.iter().chain(gradient.row(0, 2).phi_y).all(|p| p.is_nan())
         );
-    }
-
-    #[test]
-    fn rate_is_that_of_a_rotating_phasor() {
-        let (re, im) = ([2.0, 0.0], [0.0, 1.0]);
-        let (d_re, d_im) = ([0.0, -0.25], [0.5, 0.0]);
-        let mut rate = [0.0; 2];
-        rate_of_phase([&re, &im], [&d_re, &d_im], &[4.0, 1.0], 1.0, &mut rate);
-        assert_eq!(rate, [1.25, 1.25]);
     }
 }

@@ -14,6 +14,9 @@ pub trait Real: NdFloat + Default + sealed::Sealed {
     fn of(value: f64) -> Self;
     /// This value as `f64`, exactly.
     fn as_f64(self) -> f64;
+    /// Rounded towards 0 to an index or offset; beyond the range of `i32`, its nearest end; 0 for NaN. A single
+    /// conversion, unlike the way through `f64`.
+    fn as_i32(self) -> i32;
 }
 
 impl Real for f32 {
@@ -23,6 +26,9 @@ impl Real for f32 {
     fn as_f64(self) -> f64 {
         f64::from(self)
     }
+    fn as_i32(self) -> i32 {
+        self as i32
+    }
 }
 
 impl Real for f64 {
@@ -31,5 +37,8 @@ impl Real for f64 {
     }
     fn as_f64(self) -> f64 {
         self
+    }
+    fn as_i32(self) -> i32 {
+        self as i32
     }
 }

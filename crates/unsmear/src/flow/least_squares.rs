@@ -38,11 +38,12 @@ use ndarray::{Array2, Array3, ArrayView3, Axis};
 
 use crate::array::{for_each_row, require_frames};
 use crate::border::Border;
-use crate::component_velocity::{ComponentTests, largest_amplitude};
+use crate::component_tests::{ComponentTests, largest_amplitude};
 use crate::control::Control;
 use crate::convolve::{correlate_axis, gaussian_taps};
 use crate::error::{Error, Result, require};
 use crate::flow::constraint::{Pair, constrain};
+use crate::flow::normal_equations::{SUMS, TERMS, accumulate, solve};
 use crate::flow::standardize::standardize;
 use crate::flow::{Estimate, RESULT_FLOOR};
 use crate::flow_field::FlowField;
@@ -57,10 +58,6 @@ const TIME_SUPPORT: f64 = 3.0;
 const CONFIDENCE_EIGENVALUE: f64 = 0.1;
 /// Residual at which confidence is halved, rad.
 const CONFIDENCE_RESIDUAL: f64 = 0.3;
-/// Terms of a constraint: G, D and W.
-const TERMS: usize = 4;
-/// Sums over constraints: xx, xy, yy, xd, yd, dd and the weight.
-const SUMS: usize = 7;
 
 /// Parameters; see the [module](self).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -231,60 +228,6 @@ impl LeastSquares {
         }
         Estimate { flow, confidence }
     }
-}
-
-/// Adds one constraint row to the sums of its row.
-fn accumulate<T: Real>(
-    constraint: &[T],
-    flow: Option<&[ndarray::ArrayView1<'_, T>; 2]>,
-    softness: T,
-    out: &mut [T],
-) {
-    let width = constraint.len() / TERMS;
-    let [gx, gy, d, w] = [0, 1, 2, 3].map(|i| &constraint[i * width..(i + 1) * width]);
-    for x in 0..width {
-        let mut weight = w[x];
-        if let Some([u, v]) = flow {
-            let own = gx[x] * u[x] + gy[x] * v[x] + d[x];
-            // An unsolved pixel has no residual; its own constraints stay as they are.
-            if own.is_finite() {
-                let soft = T::one() + own * own * softness;
-                weight /= soft * soft;
-            }
-        }
-        let (wx, wy, wd) = (weight * gx[x], weight * gy[x], weight * d[x]);
-        let terms = [wx * gx[x], wx * gy[x], wy * gy[x], wx * d[x], wy * d[x], wd * d[x], weight];
-        for (i, term) in terms.into_iter().enumerate() {
-            out[i * width + x] += term;
-        }
-    }
-}
-
-/// `u`, `v`, least eigenvalue of `M` and mean squared residual, (4, H, W); NaN flow where singular.
-fn solve<T: Real>(sums: &Array3<T>, control: &Control) -> Result<Array3<T>> {
-    let (_, height, width) = sums.dim();
-    let mut rows = vec![T::zero(); 4 * height * width];
-    for_each_row(&mut rows, 4 * width, control, |y, out| {
-        for x in 0..width {
-            let [xx, xy, yy, xd, yd, dd, mass] =
-                [0, 1, 2, 3, 4, 5, 6].map(|i| sums[(i, y, x)].as_f64());
-            let least = (xx + yy) / 2.0 - ((xx - yy) / 2.0).hypot(xy);
-            let determinant = xx * yy - xy * xy;
-            let (mut u, mut v, mut residual) = (f64::NAN, f64::NAN, 0.0);
-            if determinant > 0.0 && least > 0.0 {
-                // Adding 0 turns the -0 of a still picture into 0.
-                u = -(yy * xd - xy * yd) / determinant + 0.0;
-                v = -(xx * yd - xy * xd) / determinant + 0.0;
-                // At the minimum sum W (G.w + D)^2 = sum W D^2 + w.b.
-                residual = (dd + u * xd + v * yd).max(0.0) / mass;
-            }
-            for (i, value) in [u, v, least, residual].into_iter().enumerate() {
-                out[i * width + x] = T::of(value);
-            }
-        }
-    })?;
-    let solution = Array3::from_shape_vec((height, 4, width), rows).unwrap_or_default();
-    Ok(solution.permuted_axes([1, 0, 2]).as_standard_layout().into_owned())
 }
 
 #[cfg(test)]

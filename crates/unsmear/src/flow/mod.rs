@@ -16,6 +16,7 @@ pub mod coarse_to_fine;
 pub(crate) mod constraint;
 pub mod fleet_jepson;
 pub mod least_squares;
+mod normal_equations;
 pub mod standardize;
 pub mod thesis;
 

@@ -18,11 +18,12 @@
 //! for warping with lagged weights; D. Sun, S. Roth, M. J. Black 2014 (doi
 //! 10.1007/s11263-013-0644-x) for the medians.
 
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 
 use super::boundary::boundaries;
 use super::data_term::{NormalEquations, Reweighting, accumulate};
 use super::diffusivity::diffusivities;
+use super::evidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
 use crate::border::Border;
@@ -60,10 +61,19 @@ pub(super) struct Settings {
     pub(super) guide_sigma: f32,
 }
 
-/// A frame at one level, `offset` frames after the reference.
-pub(super) struct OtherFrame<'a> {
+/// A frame at one level.
+pub(super) struct Frame<'a> {
+    /// Frames after the reference.
     pub(super) offset: f32,
     pub(super) picture: &'a Array2<f32>,
+    /// Weights of its pixels; none when all of them are known.
+    pub(super) coverage: Option<Array2<f32>>,
+}
+
+/// A frame ready to be warped.
+struct Target<'a> {
+    frame: &'a Frame<'a>,
+    image: SplineImage<f32>,
 }
 
 /// One level: the reference frame with what is computed from it once.
@@ -75,27 +85,34 @@ pub(super) struct Level<'a> {
     weighting: Weighting,
     edges: [Vec<f32>; 2],
     guide: Vec<Array2<f32>>,
-    others: Vec<(f32, SplineImage<f32>)>,
+    coverage: Option<&'a Array2<f32>>,
+    others: Vec<Target<'a>>,
+}
+
+/// What a level adds: the flow, and the trace of its data term.
+pub(super) struct Refined {
+    pub(super) flow: FlowField<f32>,
+    pub(super) trace: Array2<f32>,
 }
 
 impl<'a> Level<'a> {
     /// Prepares a level from the reference frame, its guide channels and the other frames.
     pub(super) fn new(
         settings: &'a Settings,
-        reference: &Array2<f32>,
+        reference: &'a Frame<'a>,
         channels: &[Array2<f32>],
-        others: &[OtherFrame<'_>],
+        others: &'a [Frame<'a>],
         control: &Control,
     ) -> Result<Self> {
-        let (height, width) = reference.dim();
-        let responses = settings.bank.respond(reference.view(), Border::Reflect, control)?;
+        let picture = reference.picture.view();
+        let (height, width) = picture.dim();
+        let responses = settings.bank.respond(picture, Border::Reflect, control)?;
         let floor = settings.amplitude_fraction * mean_power(&responses).sqrt()
             + settings.amplitude_floor;
-        let sigma = settings.bank.sigma();
-        let spline = |other: &OtherFrame<'_>| {
-            let view = other.picture.view();
+        let spline = |frame: &'a Frame<'a>| {
+            let view = frame.picture.view();
             let image = SplineImage::new(&view, SplineDegree::Cubic, Border::Reflect, control)?;
-            Ok((other.offset, image))
+            Ok(Target { frame, image })
         };
         Ok(Self {
             settings,
@@ -104,10 +121,11 @@ impl<'a> Level<'a> {
             reference: responses,
             weighting: Weighting {
                 floor: (floor * floor) as f32,
-                narrowness: (sigma / settings.tau).powi(2) as f32,
+                narrowness: (settings.bank.sigma() / settings.tau).powi(2) as f32,
             },
             edges: edge_weights(channels, settings.edges, control)?,
             guide: median_guide(channels, control)?,
+            coverage: reference.coverage.as_ref(),
             others: others.iter().map(spline).collect::<Result<_>>()?,
         })
     }
@@ -118,28 +136,64 @@ impl<'a> Level<'a> {
         mut flow: FlowField<f32>,
         warps: usize,
         control: &Control,
-    ) -> Result<FlowField<f32>> {
+    ) -> Result<Refined> {
         let mut work = Work::new(self);
         for _ in 0..warps {
-            self.constrain(&flow, &mut work, control)?;
+            for (target, out) in self.others.iter().zip(&mut work.constraints) {
+                let (responses, visible) = self.look(target, &flow, control)?;
+                let pair = [&self.reference, &responses];
+                let (bank, offset) = (&self.settings.bank, target.frame.offset);
+                constrain(bank, pair, &visible, offset, self.weighting, out, control)?;
+            }
             self.minimise(&mut flow, &mut work, control)?;
             control.advance()?;
         }
-        self.sharpen(flow, control)
+        let Work { equations: NormalEquations { a11, a22, .. }, .. } = work;
+        let trace = Array2::from_shape_fn((self.height, self.width), |(y, x)| {
+            let i = y * self.width + x;
+            a11[i] + a22[i]
+        });
+        Ok(Refined { flow: self.sharpen(flow, control)?, trace })
     }
 
-    /// Constraints of all frames, warped by `flow`.
-    fn constrain(&self, flow: &FlowField<f32>, work: &mut Work, control: &Control) -> Result<()> {
-        for ((offset, image), out) in self.others.iter().zip(&mut work.constraints) {
-            let along = FlowField { u: &flow.u * *offset, v: &flow.v * *offset };
-            let warped = image.warp(along.view(), control)?;
-            let visible = visible(along.view());
-            let responses = self.settings.bank.respond(warped.view(), Border::Reflect, control)?;
-            let pair = [&self.reference, &responses];
-            let bank = &self.settings.bank;
-            constrain(bank, pair, &visible, *offset, self.weighting, out, control)?;
+    /// Responses to a frame warped by `flow`, and the weights of its pixels.
+    fn look(
+        &self,
+        target: &Target<'_>,
+        flow: &FlowField<f32>,
+        control: &Control,
+    ) -> Result<(Responses<f32>, Vec<f32>)> {
+        let Frame { offset, picture, ref coverage } = *target.frame;
+        let along = FlowField { u: &flow.u * offset, v: &flow.v * offset };
+        let mut warped = target.image.warp(along.view(), control)?;
+        // The spline passes through the samples but for rounding, which would show as motion of frames at rest.
+        Zip::from(&mut warped).and(picture).and(&along.u).and(&along.v).for_each(|w, &p, &u, &v| {
+            if u == 0.0 && v == 0.0 {
+                *w = p;
+            }
+        });
+        let mut visible = visible(along.view(), coverage.as_ref());
+        if let Some(coverage) = self.coverage {
+            visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
         }
-        Ok(())
+        let responses = self.settings.bank.respond(warped.view(), Border::Reflect, control)?;
+        Ok((responses, visible))
+    }
+
+    /// Mean coherence of the frames at `flow`; see [`super::evidence`].
+    pub(super) fn coherence(
+        &self,
+        flow: &FlowField<f32>,
+        control: &Control,
+    ) -> Result<Array2<f32>> {
+        let mut sum = Array2::zeros(flow.dim());
+        let share = 1.0 / self.others.len() as f32;
+        for target in &self.others {
+            let (responses, visible) = self.look(target, flow, control)?;
+            let floor = self.weighting.floor;
+            add_coherence(&self.reference, &responses, &visible, floor, share, &mut sum);
+        }
+        Ok(sum)
     }
 
     /// The minimum of the energy near `flow`, within reach of one warp.
@@ -254,14 +308,21 @@ fn mean_power(responses: &Responses<f32>) -> f64 {
     sum / (filters * height * width) as f64
 }
 
-/// 1 where the flow ends inside the picture, else 0.
-fn visible(flow: FlowView<'_, f32>) -> Vec<f32> {
+/// 0 where the flow ends outside the picture, else the frame's coverage there (1 without).
+fn visible(flow: FlowView<'_, f32>, coverage: Option<&Array2<f32>>) -> Vec<f32> {
     let (height, width) = flow.dim();
     let (right, bottom) = ((width - 1) as f32, (height - 1) as f32);
     let mut out = Vec::with_capacity(height * width);
-    for ((y, x), (&u, &v)) in ndarray::indices((height, width)).into_iter().zip(flow.u.iter().zip(flow.v)) {
-        let inside = (0.0..=right).contains(&(x as f32 + u)) && (0.0..=bottom).contains(&(y as f32 + v));
-        out.push(f32::from(u8::from(inside)));
+    for (y, (row_u, row_v)) in flow.u.rows().into_iter().zip(flow.v.rows()).enumerate() {
+        for (x, (u, v)) in row_u.iter().zip(row_v).enumerate() {
+            let (to_x, to_y) = (x as f32 + u, y as f32 + v);
+            let inside = (0.0..=right).contains(&to_x) && (0.0..=bottom).contains(&to_y);
+            out.push(match coverage {
+                _ if !inside => 0.0,
+                Some(weights) => weights[(to_y.round() as usize, to_x.round() as usize)],
+                None => 1.0,
+            });
+        }
     }
     out
 }
