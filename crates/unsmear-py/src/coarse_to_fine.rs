@@ -27,6 +27,9 @@ pub(crate) struct Items {
     median_radius: usize,
     guide_sigma: f64,
     frames_each_side: usize,
+    static_evidence: bool,
+    adapt_to_noise: bool,
+    choose_frames: bool,
 }
 
 /// Flow (H, W, 2) and confidence (H, W) of frames (T, H, W) at `index`.
@@ -60,6 +63,9 @@ pub(crate) fn coarse_to_fine(
         median_radius: parameters.median_radius,
         guide_sigma: parameters.guide_sigma,
         frames_each_side: parameters.frames_each_side,
+        static_evidence: parameters.static_evidence,
+        adapt_to_noise: parameters.adapt_to_noise,
+        choose_frames: parameters.choose_frames,
     };
     let sequence = Sequence {
         frames: frames.as_array(),

@@ -13,79 +13,67 @@
 //! things that move far are missed. Frames beyond two assume constant motion.
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
 
-use ndarray::{Array2, ArrayView2, ArrayView3, Axis, Zip};
+use ndarray::{Array2, Zip};
 
-use crate::array::{require_frames, require_same};
 use crate::control::Control;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::flow::Estimate;
 use crate::flow_field::FlowField;
 use crate::gabor::{GaborBank, GaborParameters};
-use crate::pyramid::{Resampling, level_sizes, pyramid, resample};
+use crate::pyramid::{Resampling, level_sizes, resample};
 
 mod arctangent;
 mod boundary;
+mod choice;
 mod contrast;
 mod data_term;
 mod diffusivity;
 mod evidence;
+mod frames;
 mod guide;
 mod known;
+mod noise_rule;
 mod parameters;
 mod phase_constraint;
 mod refine;
 mod rows;
+mod schedule;
+mod still;
 
+pub use frames::Sequence;
 pub use parameters::CoarseToFine;
 
+use choice::{merge, several_hold};
 use contrast::Contrast;
-use evidence::{LEAST_EVIDENCE, confidence, gather};
+use evidence::LEAST_EVIDENCE;
+use frames::{FramePyramid, Plan};
 use guide::EdgeRule;
-use known::{coverage, fill};
-use refine::{Frame, Level, Settings};
+use noise_rule::adapt;
+use refine::Settings;
+use schedule::{Climb, Summit, enlarge};
 
-/// Ratio of sizes up to which a level is evidence of motion at a pixel; coarser ones tell of its surroundings.
-const FARTHEST_EVIDENCE: usize = 8;
 /// Confidence of a flow that is known and deserves none.
 const LEAST_CONFIDENCE: f32 = 1e-6;
-
-/// What a flow is measured from.
-#[derive(Debug, Clone, Copy)]
-pub struct Sequence<'a> {
-    /// Grey frames (T, H, W), any scale; not finite = unknown.
-    pub frames: ArrayView3<'a, f64>,
-    /// The reference frame.
-    pub index: usize,
-    /// Channels (C, H, W) of the reference frame, in the scale of the frames; without them the frame guides itself.
-    pub guide: Option<ArrayView3<'a, f64>>,
-    /// Pixels of every frame that may be used (H, W); without it, all.
-    pub mask: Option<ArrayView2<'a, bool>>,
-}
-
-/// A frame at all levels, finest first.
-struct FramePyramid {
-    offset: f32,
-    pictures: Vec<Array2<f32>>,
-    /// Share of the known; none when all is known.
-    known: Option<Vec<Array2<f32>>>,
-}
+/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
+const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
 
 impl CoarseToFine {
     /// Flow and confidence at the reference frame.
     ///
     /// # Errors
-    /// [`Error::Shape`] below (2, 1, 1) samples or for a guide of another size, [`Error::Value`] for a parameter out
-    /// of range or an index without a next frame, [`Error::Cancelled`].
+    /// [`Error::Shape`](crate::Error::Shape) below (2, 1, 1) samples or for a guide of another size,
+    /// [`Error::Value`](crate::Error::Value) for a parameter out of range or an index without a next frame,
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn estimate(&self, sequence: &Sequence<'_>, control: &Control) -> Result<Estimate<f32>> {
-        let settings = self.settings()?;
+        let mut settings = self.settings()?;
         let (count, height, width) = sequence.check()?;
         let sizes = level_sizes((height, width), self.pyramid_factor, self.coarsest_side);
         let contrast = Contrast::measure(sequence.frames);
-        let plan = Plan { sequence, contrast, sizes: &sizes, factor: self.pyramid_factor };
         if contrast.is_blank() {
             let confidence = Array2::zeros((height, width));
             return Ok(Estimate { flow: FlowField::unknown((height, width)), confidence });
         }
+        let plan = Plan { sequence, contrast, sizes: &sizes, factor: self.pyramid_factor };
         let reference = plan.frame(0.0, sequence.index, control)?;
         let others = self
             .offsets(sequence.index, count)
@@ -93,35 +81,27 @@ impl CoarseToFine {
             .map(|(offset, t)| plan.frame(offset, t, control))
             .collect::<Result<Vec<_>>>()?;
         let channels = plan.channels(&reference, control)?;
-        let finest = self.finest_level.min(sizes.len() - 1);
-        control.expect((finest..sizes.len()).map(|level| self.warps_at(level)).sum());
-        let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
-        let (mut evidence, mut trust) = (None, Array2::zeros((0, 0)));
-        for level in (finest..sizes.len()).rev() {
-            flow = enlarge(&flow, sizes[level], control)?;
-            let sigma = settings.bank.sigma();
-            let at_level = |frame| FramePyramid::at(frame, level, sigma, control);
-            let here = at_level(&reference)?;
-            let others = others.iter().map(at_level).collect::<Result<Vec<_>>>()?;
-            let prepared = Level::new(&settings, &here, &channels[level], &others, control)?;
-            let refined = prepared.refine(flow, self.warps_at(level), control)?;
-            flow = refined.flow;
-            if sizes[0].0 <= FARTHEST_EVIDENCE * sizes[level].0 {
-                evidence = Some(gather(evidence, &refined.trace, control)?);
-            }
-            if level == finest {
-                let coherence = prepared.coherence(&flow, control)?;
-                trust = confidence(&coherence, &flow, control)?;
-            }
+        if self.adapt_to_noise {
+            let picture = reference.pictures[0].as_slice().unwrap_or_default();
+            adapt(&mut settings, picture, (height, width), control)?;
         }
-        let mut flow = enlarge(&flow, sizes[0], control)?;
-        let mut trust = resample(trust.view(), sizes[0], Resampling::Linear, control)?;
-        let evidence = match evidence {
-            Some(evidence) => resample(evidence.view(), sizes[0], Resampling::Linear, control)?,
-            None => Array2::ones(sizes[0]),
+        let warps: Vec<usize> = (0..sizes.len()).map(|level| self.warps_at(level)).collect();
+        let climb = Climb {
+            settings: &settings,
+            sizes: &sizes,
+            warps: &warps,
+            finest: self.finest_level.min(sizes.len() - 1),
+            reference: &reference,
+            channels: &channels,
         };
-        silence(&evidence, &mut flow, &mut trust);
-        Ok(Estimate { flow, confidence: trust })
+        let others: Vec<&FramePyramid> = others.iter().collect();
+        let summit = if self.choose_frames && others.len() > 1 {
+            choose(&climb, &others, control)?
+        } else {
+            control.expect(climb.steps());
+            climb.run(&others, control)?
+        };
+        descend(summit, (height, width), control)
     }
 
     /// Offsets to the other frames, and their indices.
@@ -150,6 +130,7 @@ impl CoarseToFine {
         };
         Ok(Settings {
             bank: GaborBank::new(&gabor)?,
+            still: self.static_evidence,
             tau: self.tau,
             amplitude_fraction: self.amplitude_fraction,
             amplitude_floor: self.amplitude_floor,
@@ -168,110 +149,42 @@ impl CoarseToFine {
     }
 }
 
-impl Sequence<'_> {
-    /// (T, H, W).
-    fn check(&self) -> Result<(usize, usize, usize)> {
-        require_frames("frames", &self.frames, [2, 1, 1])?;
-        let (count, height, width) = self.frames.dim();
-        if self.index + 1 >= count {
-            return Err(Error::value("index", format!("in 0..={}", count - 2), self.index));
-        }
-        if let Some(guide) = self.guide
-            && (guide.is_empty() || guide.shape()[1..] != [height, width])
-        {
-            return Err(Error::shape("guide", format!("(C, {height}, {width})"), guide.shape()));
-        }
-        if let Some(mask) = self.mask {
-            require_same("mask", &mask, (height, width))?;
-        }
-        Ok((count, height, width))
-    }
+/// The flow of all frames where motion is constant over them, else that of the reference and the next.
+fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
+    control.expect(2 * climb.steps());
+    let next: Vec<&FramePyramid> =
+        others.iter().copied().filter(|frame| frame.offset == 1.0).collect();
+    let [smoothness, edges, residual] = FOR_TWO_FRAMES;
+    let mut settings = climb.settings.clone();
+    settings.alpha *= smoothness as f32;
+    settings.edges.sensitivity *= edges;
+    settings.residual *= residual as f32;
+    let of_two = Climb { settings: &settings, ..*climb };
+    let two = of_two.run(&next, control)?;
+    let several = climb.run(others, control)?;
+    let hold = climb.at(climb.finest, &next, control, |level| {
+        let [two, several] = [&two, &several].map(|s| level.mismatch(&s.flow, control));
+        Ok(several_hold(&two?, &several?))
+    })?;
+    let (flow, confidence) =
+        merge(&hold, (two.flow, two.confidence), (several.flow, several.confidence));
+    Ok(Summit { flow, confidence, evidence: several.evidence })
 }
 
-/// How frames become pyramids.
-struct Plan<'a, 's> {
-    sequence: &'a Sequence<'s>,
-    contrast: Contrast,
-    sizes: &'a [(usize, usize)],
-    factor: f64,
-}
-
-impl Plan<'_, '_> {
-    fn frame(&self, offset: f32, t: usize, control: &Control) -> Result<FramePyramid> {
-        let mut picture = self.contrast.apply(self.sequence.frames.index_axis(Axis(0), t));
-        if let Some(mask) = self.sequence.mask {
-            picture.zip_mut_with(&mask, |s, &keep| *s = if keep { *s } else { f32::NAN });
-        }
-        let known = fill(&mut picture, control)?;
-        let levels = |picture| pyramid(picture, self.sizes, self.factor, control);
-        Ok(FramePyramid {
-            offset,
-            pictures: levels(picture)?,
-            known: known.map(levels).transpose()?,
-        })
-    }
-
-    /// The channels of the guide at each level: the reference itself where there is no guide.
-    fn channels(
-        &self,
-        reference: &FramePyramid,
-        control: &Control,
-    ) -> Result<Vec<Vec<Array2<f32>>>> {
-        let Some(guide) = self.sequence.guide else {
-            return Ok(reference.pictures.iter().map(|p| vec![p.clone()]).collect());
-        };
-        let mut levels = vec![Vec::new(); self.sizes.len()];
-        for mut channel in self.contrast.channels(guide) {
-            fill(&mut channel, control)?;
-            for (level, picture) in
-                levels.iter_mut().zip(pyramid(channel, self.sizes, self.factor, control)?)
-            {
-                level.push(picture);
+/// The result at the size of the frames: unknown, with confidence 0, where there is no evidence.
+fn descend(summit: Summit, size: (usize, usize), control: &Control) -> Result<Estimate<f32>> {
+    let larger = |plane: &Array2<f32>| resample(plane.view(), size, Resampling::Linear, control);
+    let mut flow = enlarge(&summit.flow, size, control)?;
+    let mut confidence = larger(&summit.confidence)?;
+    let evidence = larger(&summit.evidence)?;
+    Zip::from(&evidence).and(&mut flow.u).and(&mut flow.v).and(&mut confidence).for_each(
+        |&e, u, v, c| {
+            if e >= LEAST_EVIDENCE {
+                *c = c.clamp(LEAST_CONFIDENCE, 1.0);
+            } else {
+                (*u, *v, *c) = (f32::NAN, f32::NAN, 0.0);
             }
-        }
-        Ok(levels)
-    }
-}
-
-impl FramePyramid {
-    /// The frame at one level, `sigma` px the deviation of the filters' window.
-    fn at(&self, level: usize, sigma: f64, control: &Control) -> Result<Frame<'_>> {
-        let weights = |known: &Vec<Array2<f32>>| coverage(known[level].view(), sigma, control);
-        Ok(Frame {
-            offset: self.offset,
-            picture: &self.pictures[level],
-            coverage: self.known.as_ref().map(weights).transpose()?,
-        })
-    }
-}
-
-/// Makes the flow unknown, and its confidence 0, where there is no evidence; else confidence is positive.
-fn silence(evidence: &Array2<f32>, flow: &mut FlowField<f32>, trust: &mut Array2<f32>) {
-    Zip::from(evidence).and(&mut flow.u).and(&mut flow.v).and(trust).for_each(|&e, u, v, c| {
-        if e >= LEAST_EVIDENCE {
-            *c = c.clamp(LEAST_CONFIDENCE, 1.0);
-        } else {
-            (*u, *v, *c) = (f32::NAN, f32::NAN, 0.0);
-        }
-    });
-}
-
-/// The flow at another size, motions with it; of no flow, no motion.
-fn enlarge(
-    flow: &FlowField<f32>,
-    size: (usize, usize),
-    control: &Control,
-) -> Result<FlowField<f32>> {
-    let (height, width) = flow.dim();
-    if (height, width) == size {
-        return Ok(flow.clone());
-    }
-    if height * width == 0 {
-        return Ok(FlowField { u: Array2::zeros(size), v: Array2::zeros(size) });
-    }
-    let larger = |component: &Array2<f32>, to: usize, from: usize| -> Result<Array2<f32>> {
-        let resampled = resample(component.view(), size, Resampling::Linear, control)?;
-        Ok(resampled * (to as f32 / from as f32))
-    };
-    Ok(FlowField { u: larger(&flow.u, size.1, width)?, v: larger(&flow.v, size.0, height)? })
+        },
+    );
+    Ok(Estimate { flow, confidence })
 }

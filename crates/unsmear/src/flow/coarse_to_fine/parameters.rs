@@ -42,6 +42,12 @@ pub struct CoarseToFine {
     pub guide_sigma: f64,
     /// Frames used on each side of the reference; 0: the reference and the next.
     pub frames_each_side: usize,
+    /// Fall back to two frames where motion is not constant over all.
+    pub choose_frames: bool,
+    /// Smooth more, and trust edges less, in a noisy picture.
+    pub adapt_to_noise: bool,
+    /// Hold still what the frames show to rest.
+    pub static_evidence: bool,
 }
 
 impl CoarseToFine {
@@ -66,6 +72,9 @@ impl CoarseToFine {
             median_radius: 5,
             guide_sigma: 8.0,
             frames_each_side: 0,
+            choose_frames: false,
+            adapt_to_noise: true,
+            static_evidence: true,
         }
     }
 
@@ -99,6 +108,7 @@ impl CoarseToFine {
             edge_sensitivity: 1.0,
             residual_scale: 0.5,
             frames_each_side: 3,
+            choose_frames: true,
             ..Self::balanced()
         }
     }

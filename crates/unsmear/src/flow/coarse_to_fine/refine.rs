@@ -21,11 +21,13 @@
 use ndarray::{Array2, Zip};
 
 use super::boundary::boundaries;
+use super::choice::{Explanation, Mismatch, mismatch};
 use super::data_term::{NormalEquations, Reweighting, accumulate};
 use super::diffusivity::diffusivities;
 use super::evidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
+use super::still::add_spring;
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
@@ -49,6 +51,8 @@ const MEDIAN_SPREAD: f32 = 0.8;
 #[derive(Debug, Clone)]
 pub(super) struct Settings {
     pub(super) bank: GaborBank<f32>,
+    /// Whether to look for what rests.
+    pub(super) still: bool,
     pub(super) tau: f64,
     pub(super) amplitude_fraction: f64,
     pub(super) amplitude_floor: f64,
@@ -138,6 +142,9 @@ impl<'a> Level<'a> {
         control: &Control,
     ) -> Result<Refined> {
         let mut work = Work::new(self);
+        if self.settings.still {
+            self.find_still(&mut work, control)?;
+        }
         for _ in 0..warps {
             for (target, out) in self.others.iter().zip(&mut work.constraints) {
                 let (responses, visible) = self.look(target, &flow, control)?;
@@ -154,6 +161,45 @@ impl<'a> Level<'a> {
             a11[i] + a22[i]
         });
         Ok(Refined { flow: self.sharpen(flow, control)?, trace })
+    }
+
+    /// Springs of what rests; see [`super::still`].
+    fn find_still(&self, work: &mut Work, control: &Control) -> Result<()> {
+        let zero = Array2::zeros((self.height, self.width));
+        let at_rest = FlowField { u: zero.clone(), v: zero };
+        let share = 1.0 / self.others.len() as f32;
+        for target in &self.others {
+            let (responses, visible) = self.look(target, &at_rest, control)?;
+            let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
+            let out = &mut work.constraints[0];
+            constrain(bank, pair, &visible, 1.0, self.weighting, out, control)?;
+            let (floor, wavenumber) = (self.weighting.floor, wavenumber(bank));
+            add_spring(pair, out, floor, wavenumber, share, &mut work.springs, control)?;
+        }
+        Ok(())
+    }
+
+    /// How badly `flow` explains the only other frame; see [`super::choice`].
+    pub(super) fn mismatch(&self, flow: &FlowField<f32>, control: &Control) -> Result<Mismatch> {
+        let mut work = Work::new(self);
+        let (responses, visible) = self.look(&self.others[0], flow, control)?;
+        let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
+        let (out, offset) = (&mut work.constraints[0], self.others[0].frame.offset);
+        constrain(bank, pair, &visible, offset, self.weighting, out, control)?;
+        let seen = Explanation {
+            responses: pair,
+            visible: &visible,
+            constraints: out,
+            floor: self.weighting.floor,
+            scale: self.scale(),
+        };
+        mismatch(&seen, control)
+    }
+
+    /// Factor of the sums over constraints: a trace of about 1 where all count fully.
+    fn scale(&self) -> f32 {
+        let terms = self.settings.bank.wavevectors().len() * self.others.len();
+        (1.0 / (wavenumber(&self.settings.bank).powi(2) * terms as f64)) as f32
     }
 
     /// Responses to a frame warped by `flow`, and the weights of its pixels.
@@ -199,9 +245,7 @@ impl<'a> Level<'a> {
     /// The minimum of the energy near `flow`, within reach of one warp.
     fn minimise(&self, flow: &mut FlowField<f32>, work: &mut Work, control: &Control) -> Result<()> {
         let Settings { residual, alpha, passes, sweeps, .. } = *self.settings;
-        let k0_squared = self.settings.bank.wavevectors()[0].map(|k| k * k).iter().sum::<f64>();
-        let terms = self.settings.bank.wavevectors().len() * self.others.len();
-        let scale = (1.0 / (k0_squared * terms as f64)) as f32;
+        let scale = self.scale();
         let [start_u, start_v] = [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
         let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
         let edges = [&self.edges[0][..], &self.edges[1][..]];
@@ -215,6 +259,7 @@ impl<'a> Level<'a> {
                 &mut work.equations,
                 control,
             )?;
+            add_springs(&work.springs, &mut work.equations);
             let between = [&mut work.gx[..], &mut work.gy[..]];
             diffusivities([&u, &v], edges, alpha, between, self.width, control)?;
             let system = SorSystem {
@@ -277,6 +322,8 @@ struct Work {
     /// Constraints of each frame, (H, N, 4, W).
     constraints: Vec<Vec<f32>>,
     equations: NormalEquations,
+    /// Pull towards rest, added to the diagonal; see [`super::still`].
+    springs: Vec<f32>,
     gx: Vec<f32>,
     gy: Vec<f32>,
     sor: SorScratch,
@@ -289,10 +336,24 @@ impl Work {
         Self {
             constraints: level.others.iter().map(|_| vec![0.0; per_frame]).collect(),
             equations: NormalEquations::zeros(samples),
+            springs: vec![0.0; samples],
             gx: vec![0.0; samples],
             gy: vec![0.0; samples],
             sor: SorScratch::default(),
         }
+    }
+}
+
+/// `k0`, rad/px.
+fn wavenumber(bank: &GaborBank<f32>) -> f64 {
+    let [kx, ky] = bank.wavevectors()[0];
+    kx.hypot(ky)
+}
+
+/// Springs to zero motion: they add to the matrix and, their rest being 0, nothing to the right-hand side.
+fn add_springs(springs: &[f32], equations: &mut NormalEquations) {
+    for diagonal in [&mut equations.a11, &mut equations.a22] {
+        diagonal.iter_mut().zip(springs).for_each(|(a, s)| *a += s);
     }
 }
 
