@@ -27,7 +27,7 @@ use super::diffusivity::diffusivities;
 use super::evidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
-use super::still::add_spring;
+use super::still::{Rest, look_for_rest};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
@@ -83,6 +83,8 @@ struct Target<'a> {
 /// One level: the reference frame with what is computed from it once.
 pub(super) struct Level<'a> {
     settings: &'a Settings,
+    /// Ratio of the frames' size to the level's.
+    pub(super) zoom: f32,
     height: usize,
     width: usize,
     reference: Responses<f32>,
@@ -103,6 +105,7 @@ impl<'a> Level<'a> {
     /// Prepares a level from the reference frame, its guide channels and the other frames.
     pub(super) fn new(
         settings: &'a Settings,
+        zoom: f32,
         reference: &'a Frame<'a>,
         channels: &[Array2<f32>],
         others: &'a [Frame<'a>],
@@ -120,6 +123,7 @@ impl<'a> Level<'a> {
         };
         Ok(Self {
             settings,
+            zoom,
             height,
             width,
             reference: responses,
@@ -134,16 +138,17 @@ impl<'a> Level<'a> {
         })
     }
 
-    /// The flow after `warps` warps from `flow`.
+    /// The flow after `warps` warps from `flow`, pulled towards rest by `springs`.
     pub(super) fn refine(
         &self,
         mut flow: FlowField<f32>,
         warps: usize,
+        springs: Option<Array2<f32>>,
         control: &Control,
     ) -> Result<Refined> {
         let mut work = Work::new(self);
-        if self.settings.still {
-            self.find_still(&mut work, control)?;
+        if let Some(springs) = springs {
+            work.springs = springs.into_raw_vec_and_offset().0;
         }
         for _ in 0..warps {
             for (target, out) in self.others.iter().zip(&mut work.constraints) {
@@ -163,20 +168,21 @@ impl<'a> Level<'a> {
         Ok(Refined { flow: self.sharpen(flow, control)?, trace })
     }
 
-    /// Springs of what rests; see [`super::still`].
-    fn find_still(&self, work: &mut Work, control: &Control) -> Result<()> {
+    /// What rests between the reference and the frame nearest to it; see [`super::still`].
+    pub(super) fn look_for_rest(&self, control: &Control) -> Result<Option<Rest>> {
+        if !self.settings.still {
+            return Ok(None);
+        }
         let zero = Array2::zeros((self.height, self.width));
         let at_rest = FlowField { u: zero.clone(), v: zero };
-        let share = 1.0 / self.others.len() as f32;
-        for target in &self.others {
-            let (responses, visible) = self.look(target, &at_rest, control)?;
-            let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
-            let out = &mut work.constraints[0];
-            constrain(bank, pair, &visible, 1.0, self.weighting, out, control)?;
-            let (floor, wavenumber) = (self.weighting.floor, wavenumber(bank));
-            add_spring(pair, out, floor, wavenumber, share, &mut work.springs, control)?;
-        }
-        Ok(())
+        let near = self.others.iter().find(|target| target.frame.offset == 1.0);
+        let Some(target) = near else { return Ok(None) };
+        let (responses, visible) = self.look(target, &at_rest, control)?;
+        let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
+        let mut constraints = Work::new(self).constraints.swap_remove(0);
+        constrain(bank, pair, &visible, 1.0, self.weighting, &mut constraints, control)?;
+        let (floor, k0) = (self.weighting.floor, wavenumber(bank));
+        look_for_rest(pair, &constraints, floor, k0, self.zoom, control).map(Some)
     }
 
     /// How badly `flow` explains the only other frame; see [`super::choice`].

@@ -12,6 +12,7 @@ use ndarray::Array2;
 use super::evidence::{confidence, gather};
 use super::frames::FramePyramid;
 use super::refine::{Level, Settings};
+use super::still::spring;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -52,11 +53,17 @@ impl Climb<'_> {
     pub(super) fn run(&self, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
         let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
         let (mut evidence, mut trust) = (None, None);
+        let mut resting = Vec::new();
         for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
             flow = enlarge(&flow, size, control)?;
             self.at(level, others, control, |prepared| {
                 let start = FlowField { u: flow.u.clone(), v: flow.v.clone() };
-                let refined = prepared.refine(start, self.warps[level], control)?;
+                let mut springs = None;
+                if let Some(rest) = prepared.look_for_rest(control)? {
+                    springs = Some(spring(&rest, prepared.zoom, &resting, control)?);
+                    resting.push((prepared.zoom, rest.rest));
+                }
+                let refined = prepared.refine(start, self.warps[level], springs, control)?;
                 flow = refined.flow;
                 if level == self.finest || self.sizes[0].0 <= FARTHEST_EVIDENCE * size.0 {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
@@ -88,7 +95,8 @@ impl Climb<'_> {
             .iter()
             .map(|frame| frame.at(level, sigma, control))
             .collect::<Result<Vec<_>>>()?;
-        work(&Level::new(self.settings, &here, &self.channels[level], &others, control)?)
+        let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
+        work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
     }
 }
 
