@@ -5,148 +5,122 @@
 //! becomes the upper end, else the latter the lower end; so every pass drops a sample at least, and in a cluster of
 //! samples nearly half or more. The pivot is where the weight would be half if it were spread evenly over the bracket,
 //! or, every second time, the middle of the bracket, which bounds the passes for skewed clusters.
+//!
+//! Samples are compared by *keys*: the bits of an f32 as an integer, the negative ones mirrored, are in the order of the
+//! numbers (-0 before 0). Sums and extremes of integers need no order, so that the compiler makes vectors of them.
 
 use multiversion::multiversion;
 
-use super::window::LANES;
+/// Windows hold a multiple of this number of samples: four vector registers of 512 bits.
+pub(super) const RUN: usize = 64;
 
-/// One component's bracket.
+/// Two samples, as keys, between which the middle lies, themselves included.
 #[derive(Clone, Copy)]
 struct Bracket {
-    low: f32,
-    high: f32,
-    /// Weight below `low`, and at or below `high`.
-    below: f32,
-    within: f32,
+    low: i32,
+    high: i32,
+    /// Weight below `low`.
+    below: i32,
+    /// Weight at or below `high`.
+    within: i32,
 }
 
-/// What a pass over the samples finds: the weight at or below the pivot, the greatest sample there, the least above.
-#[derive(Clone, Copy)]
-struct Found {
-    weight: [f32; LANES],
-    low: [f32; LANES],
-    high: [f32; LANES],
-}
-
-/// Least samples of `u` and of `v` at or below which lies half of the weight; whole non-negative weights, not all 0,
-/// with sums below 2^24.
+/// Least samples of `u` and of `v` at or below which lies half of the weight.
+///
+/// `keys` is scratch. All slices have the same multiple of [`RUN`] samples; weights are not negative, not all 0, and
+/// twice their sum is an i32.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn weighted_middles(u: &[f32], v: &[f32], weights: &[f32]) -> (f32, f32) {
-    let (u, v, weights) =
-        (u.as_chunks::<LANES>().0, v.as_chunks::<LANES>().0, weights.as_chunks::<LANES>().0);
-    let n = weights.len();
-    let (u, v) = (&u[..n], &v[..n]);
-    let (mut of_u, mut of_v) = (extremes(u, weights), extremes(v, weights));
-    let total = of_u.within;
+pub(super) fn weighted_middles(
+    u: &[f32],
+    v: &[f32],
+    weights: &[i32],
+    keys: &mut [i32],
+) -> (f32, f32) {
+    write_keys(u, keys);
+    let middle_u = weighted_middle(keys, weights);
+    write_keys(v, keys);
+    (middle_u, weighted_middle(keys, weights))
+}
+
+#[inline(always)]
+fn weighted_middle(keys: &[i32], weights: &[i32]) -> f32 {
+    let mut bracket = extremes(keys, weights);
+    let total = bracket.within;
     let mut even = false;
-    while of_u.low < of_u.high || of_v.low < of_v.high {
+    while bracket.low < bracket.high {
         even = !even;
-        let (pivot_u, pivot_v) = (of_u.pivot(total, even), of_v.pivot(total, even));
-        let mut found_u = Found {
-            weight: [0.0; LANES],
-            low: [f32::NEG_INFINITY; LANES],
-            high: [f32::INFINITY; LANES],
-        };
-        let mut found_v = found_u;
-        for i in 0..n {
-            found_u.add(&u[i], &weights[i], pivot_u);
-            found_v.add(&v[i], &weights[i], pivot_v);
+        let (weight, low, high) = part(keys, weights, pivot(bracket, total, even));
+        if 2 * weight >= total {
+            (bracket.high, bracket.within) = (low, weight);
+        } else {
+            (bracket.low, bracket.below) = (high, weight);
         }
-        of_u.close(&found_u, total);
-        of_v.close(&found_v, total);
     }
-    (of_u.low, of_v.low)
+    sample_of(bracket.low)
 }
 
-impl Bracket {
-    /// A value with `low` <= pivot < `high`, or any when these are the same.
-    #[inline(always)]
-    fn pivot(&self, total: f32, even: bool) -> f32 {
-        let share = (0.5 * total - self.below) / (self.within - self.below);
-        let pivot = self.low + (self.high - self.low) * if even { share } else { 0.5 };
-        if self.low <= pivot && pivot < self.high { pivot } else { self.low }
-    }
-
-    #[inline(always)]
-    fn close(&mut self, found: &Found, total: f32) {
-        if self.low < self.high {
-            let weight = sum(found.weight);
-            if 2.0 * weight >= total {
-                self.high = greatest(found.low);
-                self.within = weight;
-            } else {
-                self.low = least(found.high);
-                self.below = weight;
-            }
-        }
-    }
+/// A key with `low` <= pivot < `high`.
+#[inline(always)]
+fn pivot(bracket: Bracket, total: i32, even: bool) -> i32 {
+    let Bracket { low, high, below, within } = bracket;
+    let spread = (0.5 * total as f32 - below as f32) / (within - below) as f32;
+    let share = if even { spread } else { 0.5 };
+    let (first, last) = (sample_of(low), sample_of(high));
+    let pivot = key_of(first + (last - first) * share);
+    if low <= pivot && pivot < high { pivot } else { low }
 }
 
-impl Found {
-    #[inline(always)]
-    fn add(&mut self, samples: &[f32; LANES], weights: &[f32; LANES], pivot: f32) {
-        for l in 0..LANES {
-            let below = samples[l] <= pivot;
-            self.weight[l] += if below { weights[l] } else { 0.0 };
-            let low = if below { samples[l] } else { f32::NEG_INFINITY };
-            self.low[l] = if low > self.low[l] { low } else { self.low[l] };
-            let high = if below { f32::INFINITY } else { samples[l] };
-            self.high[l] = if high < self.high[l] { high } else { self.high[l] };
-        }
+/// The weight at or below the pivot, the greatest key there, and the least above.
+#[inline(always)]
+fn part(keys: &[i32], weights: &[i32], pivot: i32) -> (i32, i32, i32) {
+    let n = weights.len() / RUN * RUN;
+    let (keys, weights) = (&keys[..n], &weights[..n]);
+    let (mut weight, mut low, mut high) = (0, i32::MIN, i32::MAX);
+    for i in 0..n {
+        let below = keys[i] <= pivot;
+        weight += if below { weights[i] } else { 0 };
+        low = low.max(if below { keys[i] } else { i32::MIN });
+        high = high.min(if below { i32::MAX } else { keys[i] });
     }
+    (weight, low, high)
 }
 
 /// The bracket of all samples that weigh anything.
 #[inline(always)]
-fn extremes(samples: &[[f32; LANES]], weights: &[[f32; LANES]]) -> Bracket {
-    let mut low = [f32::INFINITY; LANES];
-    let mut high = [f32::NEG_INFINITY; LANES];
-    let mut total = [0.0; LANES];
-    for (samples, weights) in samples.iter().zip(weights) {
-        for l in 0..LANES {
-            let counts = weights[l] > 0.0;
-            total[l] += weights[l];
-            let s = if counts { samples[l] } else { f32::INFINITY };
-            low[l] = if s < low[l] { s } else { low[l] };
-            let s = if counts { samples[l] } else { f32::NEG_INFINITY };
-            high[l] = if s > high[l] { s } else { high[l] };
-        }
+fn extremes(keys: &[i32], weights: &[i32]) -> Bracket {
+    let n = weights.len() / RUN * RUN;
+    let (keys, weights) = (&keys[..n], &weights[..n]);
+    let (mut low, mut high, mut within) = (i32::MAX, i32::MIN, 0);
+    for i in 0..n {
+        let counts = weights[i] > 0;
+        within += weights[i];
+        low = low.min(if counts { keys[i] } else { i32::MAX });
+        high = high.max(if counts { keys[i] } else { i32::MIN });
     }
-    Bracket { low: least(low), high: greatest(high), below: 0.0, within: sum(total) }
+    Bracket { low, high, below: 0, within }
 }
 
 #[inline(always)]
-fn sum(mut lanes: [f32; LANES]) -> f32 {
-    let mut n = LANES / 2;
-    while n > 0 {
-        for l in 0..n {
-            lanes[l] += lanes[l + n];
-        }
-        n /= 2;
+fn write_keys(samples: &[f32], keys: &mut [i32]) {
+    let n = keys.len() / RUN * RUN;
+    let (samples, keys) = (&samples[..n], &mut keys[..n]);
+    for i in 0..n {
+        keys[i] = key_of(samples[i]);
     }
-    lanes[0]
 }
 
 #[inline(always)]
-fn least(mut lanes: [f32; LANES]) -> f32 {
-    let mut n = LANES / 2;
-    while n > 0 {
-        for l in 0..n {
-            lanes[l] = if lanes[l + n] < lanes[l] { lanes[l + n] } else { lanes[l] };
-        }
-        n /= 2;
-    }
-    lanes[0]
+fn key_of(sample: f32) -> i32 {
+    mirrored(sample.to_bits().cast_signed())
 }
 
 #[inline(always)]
-fn greatest(mut lanes: [f32; LANES]) -> f32 {
-    let mut n = LANES / 2;
-    while n > 0 {
-        for l in 0..n {
-            lanes[l] = if lanes[l + n] > lanes[l] { lanes[l + n] } else { lanes[l] };
-        }
-        n /= 2;
-    }
-    lanes[0]
+fn sample_of(key: i32) -> f32 {
+    f32::from_bits(mirrored(key).cast_unsigned())
+}
+
+/// Inverts all bits but the sign of a negative integer.
+#[inline(always)]
+fn mirrored(bits: i32) -> i32 {
+    bits ^ ((bits >> 31) & i32::MAX)
 }

@@ -8,8 +8,9 @@
 //!
 //! over the window |x - x'|, |y - y'| <= radius inside the picture; u and v share their weights. Where the lower and
 //! the upper half balance exactly, the lower of the two middle values is taken. The rounding makes sums of weights
-//! exact in f32, hence the result independent of their order. Pixels outside the mask are copied. Units: those of the
-//! flow (px), of the guide, and px. Validity: no NaN in the flow or the guide.
+//! exact, hence the result independent of their order. Pixels outside the mask are copied. Units: those of the
+//! flow (px), of the guide, and px. Validity: no NaN in the flow or the guide (a NaN
+//! counts as beyond infinity).
 //! Reference: D. Sun, S. Roth, M. J. Black, "Secrets of optical flow estimation and their principles", CVPR 2010,
 //! [10.1109/CVPR.2010.5539939](https://doi.org/10.1109/CVPR.2010.5539939), section 5 (without its occlusion term).
 
@@ -22,7 +23,7 @@ use crate::control::Control;
 use crate::error::{Error, Result, require};
 use window::{Window, Workspace};
 
-/// Largest radius, px: (2 x 15 + 1)^2 weights of at most 2^14 units sum to less than 2^24 of them.
+/// Largest radius, px: a window beyond it smears more than it decides, and the sums of its weights stay below 2^24.
 const LARGEST_RADIUS: usize = 15;
 
 /// Window and weights of [`weighted_median`].

@@ -7,10 +7,10 @@
 use multiversion::multiversion;
 
 use super::WeightedMedian;
-use super::middle::weighted_middles;
+use super::middle::{RUN, weighted_middles};
 
 /// Samples of a vector register of 512 bits, in f32.
-pub(super) const LANES: usize = 16;
+const LANES: usize = 16;
 
 /// Exponent beyond which a weight is dropped: exp(-7) < 0.001 of the centre's.
 const LARGEST_EXPONENT: f32 = 7.0;
@@ -31,16 +31,21 @@ pub(super) struct Window<'a> {
     ranged: f32,
 }
 
-/// Copies of the samples in a window; a multiple of [`LANES`], long enough for the spare samples of the last copy.
+/// Copies of the samples in a window; a multiple of [`RUN`], long enough for the spare samples of the last copy.
 pub(super) struct Workspace {
     flow: [Vec<f32>; 2],
-    weights: Vec<f32>,
+    /// Squared differences of the guide.
+    squares: Vec<f32>,
+    weights: Vec<i32>,
+    keys: Vec<i32>,
 }
 
 impl Workspace {
     pub(super) fn new(radius: usize) -> Self {
-        let zeros = || vec![0.0; samples(radius)];
-        Self { flow: [zeros(), zeros()], weights: zeros() }
+        let n = samples(radius);
+        let zeros = || vec![0.0; n];
+        let flow = [zeros(), zeros()];
+        Self { flow, squares: zeros(), weights: vec![0; n], keys: vec![0; n] }
     }
 }
 
@@ -52,7 +57,7 @@ fn copied(radius: usize) -> usize {
 /// Samples of a copied window.
 fn samples(radius: usize) -> usize {
     let side = 2 * radius + 1;
-    ((side - 1) * side + copied(radius)).next_multiple_of(LANES)
+    ((side - 1) * side + copied(radius)).next_multiple_of(RUN)
 }
 
 impl<'a> Window<'a> {
@@ -84,16 +89,16 @@ impl<'a> Window<'a> {
         out_u: &mut [f32],
         out_v: &mut [f32],
     ) {
-        let Workspace { flow: [u, v], weights } = workspace;
+        let Workspace { flow: [u, v], squares, weights, keys } = workspace;
         for x in (0..self.width).filter(|x| mask[*x]) {
             if self.is_inner(y, x) {
                 let corner = (y - self.radius) * self.width + x - self.radius;
                 let centre = y * self.width + x;
-                gather_inner(self, corner, centre, u, v, weights);
+                gather_inner(self, corner, centre, u, v, squares, weights);
             } else {
                 self.gather_outer(y, x, u, v, weights);
             }
-            (out_u[x], out_v[x]) = weighted_middles(u, v, weights);
+            (out_u[x], out_v[x]) = weighted_middles(u, v, weights, keys);
         }
     }
 
@@ -108,10 +113,10 @@ impl<'a> Window<'a> {
     }
 
     /// Gathers any window.
-    fn gather_outer(&self, y: usize, x: usize, u: &mut [f32], v: &mut [f32], weights: &mut [f32]) {
+    fn gather_outer(&self, y: usize, x: usize, u: &mut [f32], v: &mut [f32], weights: &mut [i32]) {
         let (radius, side) = (self.radius, 2 * self.radius + 1);
         let centre = y * self.width + x;
-        weights.fill(0.0);
+        weights.fill(0);
         for i in 0..side * side {
             let (Some(y), Some(x)) =
                 ((y + i / side).checked_sub(radius), (x + i % side).checked_sub(radius))
@@ -140,7 +145,8 @@ fn gather_inner(
     centre: usize,
     u: &mut [f32],
     v: &mut [f32],
-    weights: &mut [f32],
+    squares: &mut [f32],
+    weights: &mut [i32],
 ) {
     let side = 2 * window.radius + 1;
     let [plane_u, plane_v] = window.flow;
@@ -149,18 +155,19 @@ fn gather_inner(
         for part in (0..side).step_by(LANES) {
             copy_lanes(&plane_u[from + part..], &mut u[to + part..]);
             copy_lanes(&plane_v[from + part..], &mut v[to + part..]);
-            let mut squares = [0.0; LANES];
+            let mut sums = [0.0; LANES];
             for plane in window.guide {
-                add_squares(&plane[from + part..], plane[centre], &mut squares);
+                add_squares(&plane[from + part..], plane[centre], &mut sums);
             }
-            copy_lanes(&squares, &mut weights[to + part..]);
+            copy_lanes(&sums, &mut squares[to + part..]);
         }
     }
     // Spare samples have an infinite spatial exponent, hence no weight.
-    let spatial = &window.spatial[..weights.len()];
+    let n = weights.len() / RUN * RUN;
+    let (spatial, squares, weights) = (&window.spatial[..n], &squares[..n], &mut weights[..n]);
     let ranged = window.ranged;
-    for i in 0..weights.len() {
-        weights[i] = weight(spatial[i] + weights[i] * ranged);
+    for i in 0..n {
+        weights[i] = weight(spatial[i] + squares[i] * ranged);
     }
 }
 
@@ -186,17 +193,17 @@ fn add_squares(samples: &[f32], centre: f32, squares: &mut [f32; LANES]) {
 /// The eighth power of a Taylor polynomial of degree 6 around the middle of [0, 7/8], within 1e-5 of itself; the same
 /// bits on every machine, unlike the library's.
 #[inline(always)]
-pub(super) fn weight(e: f32) -> f32 {
+pub(super) fn weight(e: f32) -> i32 {
     /// Middle of the range of e / 8, and exp(-8 x) of it in units.
     const MIDDLE: f32 = LARGEST_EXPONENT / 16.0;
     const SCALE: f32 = 0.030_197_383 * UNITS;
-    /// Adding and subtracting it rounds to whole numbers.
+    /// Added to a number it leaves the nearest whole one in the lowest bits.
     const WHOLE: f32 = 8_388_608.0;
     let z = MIDDLE - e * 0.125;
     let p = 1.0 / 120.0 + z * (1.0 / 720.0);
     let p = 1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z * p))));
     let (p2, kept) = (p * p, e <= LARGEST_EXPONENT);
     let p4 = p2 * p2;
-    let units = (p4 * p4 * SCALE + WHOLE) - WHOLE;
-    if kept { units } else { 0.0 }
+    let units = (p4 * p4 * SCALE + WHOLE).to_bits() - WHOLE.to_bits();
+    if kept { units.cast_signed() } else { 0 }
 }
