@@ -182,8 +182,7 @@ mod tests {
     fn constant_and_own_size_are_kept() {
         let control = Control::new();
         let flat = Array2::from_elem((9, 13), 7.0f64);
-        let levels =
-            pyramid(flat, &level_sizes((9, 13), 0.75, 3.0), 0.75, &control).unwrap();
+        let levels = pyramid(flat, &level_sizes((9, 13), 0.75, 3.0), 0.75, &control).unwrap();
         assert!(levels.len() > 3 && levels.iter().flatten().all(|s| (s - 7.0).abs() < 1e-13));
         let same = resample(ramp((9, 13)).view(), (9, 13), Resampling::Cubic, &control).unwrap();
         assert_eq!(same, ramp((9, 13)));

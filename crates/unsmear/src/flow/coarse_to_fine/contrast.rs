@@ -66,7 +66,8 @@ mod tests {
     fn gain_and_offset_cancel() {
         let frames = Array3::from_shape_fn((2, 5, 6), |(t, y, x)| (t + 3 * y * x) as f64);
         let other = frames.mapv(|s| 1e-3 * s + 4.0);
-        let standard = |f: &Array3<f64>| Contrast::measure(f.view()).apply(f.index_axis(Axis(0), 1));
+        let standard =
+            |f: &Array3<f64>| Contrast::measure(f.view()).apply(f.index_axis(Axis(0), 1));
         let (one, two) = (standard(&frames), standard(&other));
         assert!(one.iter().zip(&two).all(|(a, b)| (a - b).abs() < 1e-4));
     }
@@ -76,9 +77,12 @@ mod tests {
         let mut frames = Array3::from_shape_fn((1, 4, 4), |(_, y, x)| (y * x) as f64);
         let contrast = Contrast::measure(frames.view());
         let mean = frames.mean().unwrap();
-        frames = Array3::from_shape_fn((1, 4, 5), |(_, y, x)| {
-            if x == 4 { f64::NAN } else { (y * x) as f64 }
-        });
+        frames = Array3::from_shape_fn(
+            (1, 4, 5),
+            |(_, y, x)| {
+                if x == 4 { f64::NAN } else { (y * x) as f64 }
+            },
+        );
         assert_eq!(Contrast::measure(frames.view()), contrast);
         assert!((contrast.mean - mean).abs() < 1e-15);
         assert!(Contrast::measure(Array3::from_elem((1, 3, 3), 0.1).view()).is_blank());

@@ -145,8 +145,7 @@ mod tests {
             for x in 0..width {
                 terms[x] = g[0];
                 terms[width + x] = g[1];
-                terms[2 * width + x] =
-                    -g[0] * (truth[0] - start[0]) - g[1] * (truth[1] - start[1]);
+                terms[2 * width + x] = -g[0] * (truth[0] - start[0]) - g[1] * (truth[1] - start[1]);
                 terms[3 * width + x] = 0.1 + 0.2 * x as f32;
             }
         }

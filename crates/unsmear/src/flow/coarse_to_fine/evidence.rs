@@ -70,9 +70,8 @@ pub(super) fn confidence(
     control: &Control,
 ) -> Result<Array2<f32>> {
     let coherence = smooth(coherence.view(), COHERENCE_SIGMA, control)?;
-    let steep = Array2::from_shape_fn(flow.dim(), |at| {
-        (slope(&flow.u, at) + slope(&flow.v, at)).sqrt()
-    });
+    let steep =
+        Array2::from_shape_fn(flow.dim(), |at| (slope(&flow.u, at) + slope(&flow.v, at)).sqrt());
     let steep = smooth(steep.view(), GRADIENT_SIGMA, control)?;
     Ok(Zip::from(&coherence)
         .and(&steep)

@@ -59,8 +59,11 @@ pub(super) fn edge_weights(
             for y in 0..height - usize::from(axis == 1) {
                 for i in y * width..(y + 1) * width - usize::from(axis == 0) {
                     let square = (samples[i + step] - samples[i]).powi(2) * share;
-                    squares[i] =
-                        if rule.strongest_channel { squares[i].max(square) } else { squares[i] + square };
+                    squares[i] = if rule.strongest_channel {
+                        squares[i].max(square)
+                    } else {
+                        squares[i] + square
+                    };
                 }
             }
         }
@@ -107,8 +110,7 @@ mod tests {
         let flat = Array2::from_elem((4, 6), 7.0f32);
         let step = Array2::from_shape_fn((4, 6), |(_, x)| if x < 3 { 0.0 } else { 50.0 });
         let rule = |strongest_channel| EdgeRule { sensitivity: 1.0, sigma: 0.7, strongest_channel };
-        let alone =
-            edge_weights(std::slice::from_ref(&step), rule(true), &Control::new()).unwrap();
+        let alone = edge_weights(std::slice::from_ref(&step), rule(true), &Control::new()).unwrap();
         let both = edge_weights(&[step, flat], rule(true), &Control::new()).unwrap();
         assert_eq!(alone, both);
     }

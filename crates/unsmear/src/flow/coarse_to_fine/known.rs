@@ -76,7 +76,9 @@ pub(super) fn coverage(
 ) -> Result<Array2<f32>> {
     let certain = share.mapv(|k| if k >= LEAST_SHARE { 1.0 } else { 0.0 });
     let covered = smooth(certain.view(), sigma, control)?;
-    Ok(Zip::from(&certain).and(&covered).map_collect(|&k: &f32, &c: &f32| k * c.powi(COVERAGE_POWER)))
+    Ok(Zip::from(&certain)
+        .and(&covered)
+        .map_collect(|&k: &f32, &c: &f32| k * c.powi(COVERAGE_POWER)))
 }
 
 #[cfg(test)]

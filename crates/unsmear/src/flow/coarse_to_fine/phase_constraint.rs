@@ -172,8 +172,10 @@ impl Cross {
 /// Deviation of the phase gradient along one axis from the tuned one, rad/px.
 #[inline(always)]
 fn deviation([re, im]: [f32; 2], [a, b]: [[f32; 2]; 2], s: Stencil, inverse: f32) -> f32 {
-    let slope_re = s.before[0] * a[0] - s.before[1] * a[1] + (s.after[0] * b[0] - s.after[1] * b[1]);
-    let slope_im = s.before[0] * a[1] + s.before[1] * a[0] + (s.after[0] * b[1] + s.after[1] * b[0]);
+    let slope_re =
+        s.before[0] * a[0] - s.before[1] * a[1] + (s.after[0] * b[0] - s.after[1] * b[1]);
+    let slope_im =
+        s.before[0] * a[1] + s.before[1] * a[0] + (s.after[0] * b[1] + s.after[1] * b[0]);
     (re * slope_im - im * slope_re) * inverse
 }
 

@@ -114,8 +114,8 @@ impl<'a> Level<'a> {
         let picture = reference.picture.view();
         let (height, width) = picture.dim();
         let responses = settings.bank.respond(picture, Border::Reflect, control)?;
-        let floor = settings.amplitude_fraction * mean_power(&responses).sqrt()
-            + settings.amplitude_floor;
+        let floor =
+            settings.amplitude_fraction * mean_power(&responses).sqrt() + settings.amplitude_floor;
         let spline = |frame: &'a Frame<'a>| {
             let view = frame.picture.view();
             let image = SplineImage::new(&view, SplineDegree::Cubic, Border::Reflect, control)?;
@@ -198,6 +198,7 @@ impl<'a> Level<'a> {
             constraints: out,
             floor: self.weighting.floor,
             scale: self.scale(),
+            residual: self.settings.residual,
         };
         mismatch(&seen, control)
     }
@@ -219,11 +220,13 @@ impl<'a> Level<'a> {
         let along = FlowField { u: &flow.u * offset, v: &flow.v * offset };
         let mut warped = target.image.warp(along.view(), control)?;
         // The spline passes through the samples but for rounding, which would show as motion of frames at rest.
-        Zip::from(&mut warped).and(picture).and(&along.u).and(&along.v).for_each(|w, &p, &u, &v| {
-            if u == 0.0 && v == 0.0 {
-                *w = p;
-            }
-        });
+        Zip::from(&mut warped).and(picture).and(&along.u).and(&along.v).for_each(
+            |w, &p, &u, &v| {
+                if u == 0.0 && v == 0.0 {
+                    *w = p;
+                }
+            },
+        );
         let mut visible = visible(along.view(), coverage.as_ref());
         if let Some(coverage) = self.coverage {
             visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
@@ -249,10 +252,16 @@ impl<'a> Level<'a> {
     }
 
     /// The minimum of the energy near `flow`, within reach of one warp.
-    fn minimise(&self, flow: &mut FlowField<f32>, work: &mut Work, control: &Control) -> Result<()> {
+    fn minimise(
+        &self,
+        flow: &mut FlowField<f32>,
+        work: &mut Work,
+        control: &Control,
+    ) -> Result<()> {
         let Settings { residual, alpha, passes, sweeps, .. } = *self.settings;
         let scale = self.scale();
-        let [start_u, start_v] = [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
+        let [start_u, start_v] =
+            [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
         let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
         let edges = [&self.edges[0][..], &self.edges[1][..]];
         for _ in 0..passes {
