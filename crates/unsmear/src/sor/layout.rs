@@ -21,15 +21,19 @@ pub(super) const LANES: usize = 16;
 /// Relative determinant at or below which a pixel without neighbours counts as singular: rounding of `a11 a22 - a12^2`.
 const SINGULAR: f32 = 1e-6;
 
-/// Half-rows of a coefficient row: the 5 of red pixels (inverse 11, 12, 22, right-hand sides 1, 2), ...
+/// First of the 5 half-rows of red pixels in a coefficient row: inverse 11, 12, 22, right-hand sides 1, 2.
 pub(super) const RED: usize = 0;
-/// ... the diffusivities of red pixels towards west, east, north and south, ...
+/// Half-row of the diffusivities of red pixels towards west.
 pub(super) const WEST: usize = 5;
+/// Towards east.
 pub(super) const EAST: usize = 6;
+/// Towards north.
 pub(super) const NORTH: usize = 7;
+/// Towards south.
 pub(super) const SOUTH: usize = 8;
-/// ... and the 5 of black pixels.
+/// First of the 5 half-rows of black pixels, as [`RED`].
 pub(super) const BLACK: usize = 9;
+/// Half-rows of a coefficient row.
 const HALF_ROWS: usize = 14;
 
 /// Half-rows of a field row.
@@ -101,26 +105,22 @@ impl Layout {
         scratch: &mut [f32],
     ) {
         let (width, parity) = (self.width, y % 2);
-        let row = |plane: &[f32], y: usize| -> std::ops::Range<usize> {
-            debug_assert!(plane.len() >= (y + 1) * width);
-            y * width..(y + 1) * width
-        };
-        let here = row(u, y);
+        let row = |y: usize| y * width..(y + 1) * width;
         let (edges, scratch) = scratch.split_at_mut(width + 1);
-        edges[1..width].copy_from_slice(&system.gx[here.clone()][..width - 1]);
+        edges[1..width].copy_from_slice(&system.gx[row(y)][..width - 1]);
         (edges[0], edges[width]) = (0.0, 0.0);
         let (zeros, scratch) = scratch.split_at_mut(width);
         zeros.fill(0.0);
-        let north = if y > 0 { &system.gy[row(u, y - 1)] } else { &*zeros };
-        let south = if y + 1 < self.height { &system.gy[here.clone()] } else { &*zeros };
-        let (u, v) = (&u[here.clone()], &v[here.clone()]);
+        let north = if y > 0 { &system.gy[row(y - 1)] } else { &*zeros };
+        let south = if y + 1 < self.height { &system.gy[row(y)] } else { &*zeros };
+        let (u, v) = (&u[row(y)], &v[row(y)]);
         let mut outputs = scratch.chunks_exact_mut(width);
         if let (Some(i11), Some(i12), Some(i22), Some(c1), Some(c2)) =
             (outputs.next(), outputs.next(), outputs.next(), outputs.next(), outputs.next())
         {
             let [a11, a12, a22, b1, b2] =
                 [system.a11, system.a12, system.a22, system.c1, system.c2]
-                    .map(|plane| &plane[here.clone()]);
+                    .map(|plane| &plane[row(y)]);
             let planes = [a11, a12, a22, b1, b2, u, v, north, south, edges];
             invert_row(planes, i11, i12, i22, c1, c2);
         }

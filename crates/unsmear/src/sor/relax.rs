@@ -65,16 +65,9 @@ fn relax_half_row(
     let (u, v) = own.split_at_mut(stride);
     let n = layout.covered();
     // Rows of the picture count from 1 here.
-    let west = LANES - usize::from((row - 1 + colour) % 2 == 0);
-    let cut = |slice: &'_ [f32], from: usize| -> Range<usize> {
-        debug_assert!(slice.len() >= from + n);
-        from..from + n
-    };
+    let west = LANES - usize::from((row - 1 + colour).is_multiple_of(2));
     let block = |row: usize| &coefficients[row * layout.block()..][..layout.block()];
-    let half_row = |row: usize, i: usize, start: usize| {
-        let block = block(row);
-        &block[cut(block, i * stride + start)]
-    };
+    let half_row = |row: usize, i: usize, start: usize| &block(row)[i * stride + start..][..n];
     let edges = if colour == 0 {
         [WEST, EAST, NORTH, SOUTH].map(|i| half_row(row, i, LANES))
     } else {
