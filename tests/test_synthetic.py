@@ -84,8 +84,8 @@ def test_exposure_integrates_the_motion() -> None:
 
 
 def test_layers_move_apart_and_hide_each_other() -> None:
-    opacity = np.zeros((40, 40))
-    opacity[10:30, 10:30] = 1
+    opacity = np.zeros((40, 40), dtype=bool)
+    opacity[10:30, 10:30] = True
     s = synthetic.layers(
         TEXTURE,
         synthetic.texture((40, 40), seed=5),
@@ -126,6 +126,13 @@ def test_colour_textures_keep_their_channels() -> None:
     np.testing.assert_allclose(s.blurred[..., 0], 1 - s.blurred[..., 1], atol=1e-12)
 
 
+def _grey_before_colour() -> synthetic.Scene:
+    still = synthetic.zooming(0)
+    colour = np.stack([TEXTURE] * 3, axis=-1)
+    back, front = synthetic.Layer(colour, still), synthetic.Layer(TEXTURE, still)
+    return synthetic.Scene((back, front), SHAPE)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -141,6 +148,14 @@ def test_colour_textures_keep_their_channels() -> None:
             lambda: synthetic.Layer(TEXTURE, synthetic.zooming(0), TEXTURE[1:]),
             "opacity",
         ),
+        (
+            lambda: synthetic.Layer(TEXTURE, synthetic.zooming(0), 2.0 + TEXTURE),
+            r"opacity must be in \[0, 1\]",
+        ),
+        (lambda: synthetic.Layer(TEXTURE * np.nan, synthetic.zooming(0)), "finite"),
+        (lambda: synthetic.Scene((), SHAPE), "layers"),
+        (lambda: synthetic.translation(TEXTURE, (1, 0), shape=(0, 5)), "shape"),
+        (_grey_before_colour, "channels"),
     ],
 )
 def test_bad_input_is_named(call, message: str) -> None:

@@ -12,6 +12,8 @@
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772); Fleet & Jepson 1993 (doi
 //! 10.1109/34.250844) on singularities.
 
+use multiversion::multiversion;
+
 use crate::error::{Result, require};
 use crate::gabor::Responses;
 use crate::real::Real;
@@ -54,17 +56,31 @@ impl ComponentTests {
 #[must_use]
 pub fn largest_amplitude<T: Real>(responses: &Responses<T>) -> f64 {
     let (filters, height, _) = responses.dim();
-    let mut largest = T::zero();
-    for (y, filter) in (0..height).flat_map(|y| (0..filters).map(move |f| (y, f))) {
-        let (re, im) = responses.row(filter, y);
-        for (a, b) in re.iter().zip(im) {
-            let power = *a * *a + *b * *b;
-            if power > largest {
-                largest = power;
-            }
+    (0..height)
+        .flat_map(|y| (0..filters).map(move |filter| responses.row(filter, y)))
+        .fold(T::zero(), |largest, (re, im)| largest_power(re, im, largest))
+        .as_f64()
+        .sqrt()
+}
+
+/// The larger of `least` and the largest `re^2 + im^2`; NaN does not count.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn largest_power<T: Real>(re: &[T], im: &[T], least: T) -> T {
+    // The maximum is the same in any order, so each lane may keep its own.
+    const LANES: usize = 32;
+    let mut lanes = [least; LANES];
+    let n = re.len() - re.len() % LANES;
+    for (re, im) in re[..n].chunks_exact(LANES).zip(im[..n].chunks_exact(LANES)) {
+        for i in 0..LANES {
+            let power = re[i] * re[i] + im[i] * im[i];
+            lanes[i] = if power > lanes[i] { power } else { lanes[i] };
         }
     }
-    largest.as_f64().sqrt()
+    for (&re, &im) in re[n..].iter().zip(&im[n..]) {
+        let power = re * re + im * im;
+        lanes[0] = if power > lanes[0] { power } else { lanes[0] };
+    }
+    lanes.into_iter().fold(least, |largest, lane| if lane > largest { lane } else { largest })
 }
 
 #[cfg(test)]

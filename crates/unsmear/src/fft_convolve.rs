@@ -6,12 +6,13 @@
 //! f(y, x) = sum_{j, i} g(j, i) I(y - j, x - i),   0 <= y < 2H - 1,  0 <= x < 2W - 1
 //! ```
 //!
-//! with zeros outside both (an explicit [`Border::Zero`](crate::Border::Zero)); kept are the (H, W)
+//! with zeros outside both (an explicit [`Border::Zero`]); kept are the (H, W)
 //! samples from `crop` on. A padded size of (2H, 2W) holds it without wrap-around. Transforms run
 //! axis by axis, so that empty rows are never transformed and unused ones never computed.
 //!
 //! A spectrum is kept transposed, (2W, 2H): its long axis is the one transformed last.
 
+use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2};
 
 use crate::border::Border;
@@ -21,6 +22,9 @@ use crate::fourier::{Complex64, LinePlan, transpose_into};
 
 /// Lines transformed between two looks at the control: below 20 ms for lines of 8192 samples.
 const LINES_PER_STEP: usize = 64;
+/// Lines carried from one axis to the other together: eight samples are two cache lines wide, and
+/// eight streams a power of two apart still fit the ways of a first-level cache.
+const LINES_PER_TURN: usize = 8;
 
 /// Plan for one picture shape; see the [module](self).
 pub struct FftConvolver {
@@ -29,6 +33,15 @@ pub struct FftConvolver {
     crop: [usize; 2],
     along_x: LinePlan,
     along_y: LinePlan,
+}
+
+/// Some lines of a spectrum, the others being 0.
+#[derive(Debug, Clone)]
+pub struct LineSpectrum {
+    /// Which lines of the (2W, 2H) spectrum.
+    pub lines: Vec<usize>,
+    /// Their values, line after line.
+    pub values: Vec<Complex64>,
 }
 
 /// Buffers of an [`FftConvolver`], reusable over calls. Their contents are never read.
@@ -67,17 +80,18 @@ impl FftConvolver {
         self.padded_spectrum(|y, x| Complex64::new(picture[(y, x)], 0.0), scratch, control)
     }
 
-    /// Spectrum of a complex kernel, row-major in the shape of the pictures, zero-padded.
+    /// Spectrum of a kernel, row-major in the shape of the pictures, zero-padded.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
     pub fn kernel_spectrum(
         &self,
-        kernel: &[Complex64],
+        kernel: impl Fn(usize, usize) -> Complex64,
         scratch: &mut FftScratch,
         control: &Control,
-    ) -> Result<Vec<Complex64>> {
-        self.padded_spectrum(|y, x| kernel[y * self.width + x], scratch, control)
+    ) -> Result<LineSpectrum> {
+        let values = self.padded_spectrum(kernel, scratch, control)?;
+        Ok(LineSpectrum { lines: (0..2 * self.width).collect(), values })
     }
 
     fn padded_spectrum(
@@ -108,41 +122,52 @@ impl FftConvolver {
         Ok(spectrum)
     }
 
-    /// The kept part of the convolution whose factors have these spectra, shape (H, W).
+    /// Real and imaginary part of the kept part of the convolution of a picture and a kernel with
+    /// these spectra, each row-major (H, W). Lines that the kernel lacks cost nothing.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
     pub fn convolve(
         &self,
         picture: &[Complex64],
-        kernel: &[Complex64],
+        kernel: &LineSpectrum,
+        [re, im]: [&mut [f64]; 2],
         scratch: &mut FftScratch,
         control: &Control,
-    ) -> Result<Array2<Complex64>> {
+    ) -> Result<()> {
         let (h, w) = (self.height, self.width);
         let [top, left] = self.crop;
-        scratch.lines.clear();
-        scratch.lines.extend(picture.iter().zip(kernel).map(|(a, b)| a * b));
-        scratch.turned.clear();
-        for lines in scratch.lines.chunks_mut(LINES_PER_STEP * 2 * h) {
+        let FftScratch { lines, turned, transform } = scratch;
+        refill(turned, h * 2 * w);
+        refill(lines, LINES_PER_TURN * 2 * h.max(w));
+        let values = kernel.values.chunks(LINES_PER_TURN * 2 * h);
+        for (columns, values) in kernel.lines.chunks(LINES_PER_TURN).zip(values) {
             control.check()?;
-            self.along_y.inverse(lines, &mut scratch.transform);
-            for line in lines.chunks(2 * h) {
-                scratch.turned.extend_from_slice(&line[top..top + h]);
+            let lines = &mut lines[..values.len()];
+            for (i, &column) in columns.iter().enumerate() {
+                let at = i * 2 * h..(i + 1) * 2 * h;
+                multiply(&picture[column * 2 * h..][..2 * h], &values[at.clone()], &mut lines[at]);
+            }
+            self.along_y.inverse(lines, transform);
+            for (y, row) in turned.chunks_mut(2 * w).enumerate() {
+                for (i, &column) in columns.iter().enumerate() {
+                    row[column] = lines[i * 2 * h + top + y];
+                }
             }
         }
-        scratch.lines.resize(h * 2 * w, Complex64::default());
-        transpose_into(&scratch.turned, 2 * w, h, &mut scratch.lines);
         let scale = 1.0 / (4 * h * w) as f64;
-        let mut kept = Vec::with_capacity(h * w);
-        for lines in scratch.lines.chunks_mut(LINES_PER_STEP * 2 * w) {
+        let parts = re.chunks_mut(LINES_PER_TURN * w).zip(im.chunks_mut(LINES_PER_TURN * w));
+        for (rows, (re, im)) in turned.chunks_mut(LINES_PER_TURN * 2 * w).zip(parts) {
             control.check()?;
-            self.along_x.inverse(lines, &mut scratch.transform);
-            for line in lines.chunks(2 * w) {
-                kept.extend(line[left..left + w].iter().map(|sample| sample * scale));
+            self.along_x.inverse(rows, transform);
+            let parts = re.chunks_mut(w).zip(im.chunks_mut(w));
+            for (row, (re, im)) in rows.chunks(2 * w).zip(parts) {
+                for ((sample, re), im) in row[left..left + w].iter().zip(re).zip(im) {
+                    (*re, *im) = (sample.re * scale, sample.im * scale);
+                }
             }
         }
-        Ok(Array2::from_shape_vec((h, w), kept).unwrap_or_default())
+        Ok(())
     }
 }
 
@@ -180,9 +205,23 @@ pub fn fft_convolve(
     let plan = FftConvolver::new(shape.0, shape.1, [h - 1, w - 1])?;
     let mut scratch = FftScratch::default();
     let picture = plan.spectrum(continued.view(), &mut scratch, control)?;
-    let kernel = plan.spectrum(padded.view(), &mut scratch, control)?;
-    let full = plan.convolve(&picture, &kernel, &mut scratch, control)?;
-    Ok(Array2::from_shape_fn((height, width), |at| full[at].re))
+    let kernel =
+        plan.kernel_spectrum(|j, i| Complex64::new(padded[(j, i)], 0.0), &mut scratch, control)?;
+    let mut parts = [(); 2].map(|()| vec![0.0; shape.0 * shape.1]);
+    let [re, im] = &mut parts;
+    plan.convolve(&picture, &kernel, [re, im], &mut scratch, control)?;
+    Ok(Array2::from_shape_fn((height, width), |(y, x)| parts[0][y * shape.1 + x]))
+}
+
+/// `out = a b`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn multiply(a: &[Complex64], b: &[Complex64], out: &mut [Complex64]) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        out[x].re = a[x].re * b[x].re - a[x].im * b[x].im;
+        out[x].im = a[x].re * b[x].im + a[x].im * b[x].re;
+    }
 }
 
 fn refill(buffer: &mut Vec<Complex64>, length: usize) {
@@ -205,12 +244,14 @@ mod tests {
         let go = Control::new();
         for crop in [[0, 0], [2, 3], [h, w]] {
             let plan = FftConvolver::new(h, w, crop).unwrap();
-            let spectra = [
-                plan.spectrum(picture.view(), &mut scratch, &go).unwrap(),
-                plan.kernel_spectrum(&kernel, &mut scratch, &go).unwrap(),
-            ];
-            let got = plan.convolve(&spectra[0], &spectra[1], &mut scratch, &go).unwrap();
-            for ((y, x), got) in got.indexed_iter() {
+            let spectrum = plan.spectrum(picture.view(), &mut scratch, &go).unwrap();
+            let kernel_spectrum =
+                plan.kernel_spectrum(|j, i| kernel[j * w + i], &mut scratch, &go).unwrap();
+            let (mut re, mut im) = (vec![9.0; h * w], vec![9.0; h * w]);
+            let out = [&mut re[..], &mut im[..]];
+            plan.convolve(&spectrum, &kernel_spectrum, out, &mut scratch, &go).unwrap();
+            for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                let got = Complex64::new(re[y * w + x], im[y * w + x]);
                 let mut sum = Complex64::default();
                 for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
                     let (row, column) =

@@ -11,7 +11,8 @@
 
 use std::sync::Arc;
 
-use rustfft::num_complex::Complex;
+/// Complex numbers of either precision.
+pub use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 /// Shorthand of this module's users.

@@ -193,38 +193,47 @@ fn evaluate<T: Real, const N: usize>(
             *value = T::nan();
             continue;
         }
-        let (rows, wy) = taps::<T, N>(y, height, reflect);
-        let (columns, wx) = taps::<T, N>(x, width, reflect);
-        let mut sum = T::zero();
-        if columns[N - 1] == columns[0] + N - 1 {
+        let (first_row, ty) = first_tap::<T, N>(y, height, reflect);
+        let (first_column, tx) = first_tap::<T, N>(x, width, reflect);
+        let (wy, wx) = (weights::<T, N>(ty), weights::<T, N>(tx));
+        // Down the columns first: N independent sums side by side, added up once at the end.
+        let mut down = [T::zero(); N];
+        let inside = first_row >= 0
+            && first_column >= 0
+            && first_row as usize + N <= height
+            && first_column as usize + N <= width;
+        if inside {
+            let corner = first_row as usize * width + first_column as usize;
             for k in 0..N {
-                let line = &c[rows[k] * width + columns[0]..][..N];
-                let mut across = T::zero();
+                let line = &c[corner + k * width..][..N];
                 for l in 0..N {
-                    across += wx[l] * line[l];
+                    down[l] += wy[k] * line[l];
                 }
-                sum += wy[k] * across;
             }
         } else {
+            // The coefficients continue as the mirror does, whatever the rule for positions.
+            let at = |i: isize, n| Border::Reflect.index(i, n).unwrap_or_default();
             for k in 0..N {
-                let line = &c[rows[k] * width..][..width];
-                let mut across = T::zero();
+                let line = at(first_row + k as isize, height) * width;
                 for l in 0..N {
-                    across += wx[l] * line[columns[l]];
+                    down[l] += wy[k] * c[line + at(first_column + l as isize, width)];
                 }
-                sum += wy[k] * across;
             }
+        }
+        let mut sum = T::zero();
+        for l in 0..N {
+            sum += wx[l] * down[l];
         }
         *value = sum;
     }
 }
 
-/// Indices and weights of the N samples around a finite position on a line of `n` samples.
+/// The first of the N samples around a finite position on a line of `n` samples, and the position's fraction.
 #[inline(always)]
-fn taps<T: Real, const N: usize>(position: f64, n: usize, reflect: bool) -> ([usize; N], [T; N]) {
+fn first_tap<T: Real, const N: usize>(position: f64, n: usize, reflect: bool) -> (isize, T) {
     let last = (n - 1) as f64;
     let mut p = position;
-    if !(0.0..=last).contains(&p) {
+    if p < 0.0 || p > last {
         p = if reflect && n > 1 {
             let folded = p.rem_euclid(2.0 * last);
             folded.min(2.0 * last - folded)
@@ -232,14 +241,8 @@ fn taps<T: Real, const N: usize>(position: f64, n: usize, reflect: bool) -> ([us
             p.clamp(0.0, last)
         };
     }
-    let first = p as isize - (N as isize / 2 - 1); // p >= 0: truncation is the floor
-    let mut indices = [0; N];
-    for (k, index) in indices.iter_mut().enumerate() {
-        let i = first + k as isize;
-        // The coefficients continue as the mirror does, whatever the rule for positions.
-        *index = Border::Reflect.index(i, n).unwrap_or_default();
-    }
-    (indices, weights::<T, N>(T::of(p - p.trunc())))
+    let whole = p as isize; // p >= 0: truncation is the floor
+    (whole - (N as isize / 2 - 1), T::of(p - whole as f64))
 }
 
 /// `B_n(t - k)` for the N = n + 1 samples k whose B-splines reach the position at fraction `t` in [0, 1).

@@ -9,15 +9,17 @@
 //! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
-//! | 5 | [`gabor`] | filters tuned to a wavevector, complex responses |
-//! | 6 | [`phase_gradient`], [`spatiotemporal`], [`component_tests`] | phase in space; filters in space and time; what to believe |
-//! | 7 | [`component_velocity`] | what one filter sees of the motion |
-//! | 8 | [`flow`] | an estimate of flow, with confidence |
+//! | 4 | [`pyramid`], `spline_filter`, [`median`], [`weighted_median`], [`sor`], [`immerkaer_noise`] | sizes of pictures; splines; kernels of the default flow |
+//! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
+//! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
+//! | 7 | [`phase_gradient`] | phase in space |
+//! | 8 | [`component_velocity`] | what one filter sees of the motion |
+//! | 8 | [`flow`], [`flow::thesis::bank`] | an estimate of flow, with confidence; the founding filters |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
-//! | 9 | [`flow::thesis::bank`], [`flow::thesis::components`], [`flow::thesis::gated_mean`] | parts of the founding method |
-//! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
-//! | 11 | [`psf`], `streamline`, `local_spline`, `spline_filter`, [`noise`] | kernels and paths of motion; sampling; noise |
-//! | 12 | [`interpolate`], [`blur`] | pictures between pixels, warping; the forward operator |
+//! | 9 | [`flow::thesis::components`], [`flow::thesis::gated_mean`], [`flow::thesis::pruned`] | parts of the founding method |
+//! | 10 | [`flow::coarse_to_fine`], [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
+//! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
+//! | 12 | [`blur`] | the forward operator |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
@@ -35,6 +37,7 @@ pub mod component_velocity;
 pub mod control;
 pub mod convolve;
 pub mod deblur;
+mod demodulation;
 pub mod error;
 mod even_odd;
 pub mod fft_convolve;

@@ -37,6 +37,7 @@ pub fn rate_of_phase<T: Real>(
 /// `arg(conj(R) R')` of a row: the phase advance from one frame to the next, rad in (-pi, pi].
 ///
 /// Exact for any uniform shift below half a wavelength; exactly 0 for equal responses.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn phase_step<T: Real>(first: ComplexRow<'_, T>, second: ComplexRow<'_, T>, out: &mut [T]) {
     let n = out.len();
     let ((a_re, a_im), (b_re, b_im)) = (first, second);
@@ -44,7 +45,7 @@ pub fn phase_step<T: Real>(first: ComplexRow<'_, T>, second: ComplexRow<'_, T>, 
     for x in 0..n {
         let across = a_re[x] * b_im[x] - a_im[x] * b_re[x];
         let along = a_re[x] * b_re[x] + a_im[x] * b_im[x];
-        out[x] = across.atan2(along);
+        out[x] = T::angle(across, along);
     }
 }
 

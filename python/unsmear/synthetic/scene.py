@@ -37,8 +37,8 @@ class Layer:
     motion : Motion
         See `motion`.
     opacity : array_like of shape (H, W), optional
-        In [0, 1]; transparent beyond its edges. Default: opaque everywhere, the texture
-        mirrored beyond its edges.
+        Bool, or in [0, 1] (integers are scaled by their range); transparent beyond its
+        edges. Default: opaque everywhere, the texture mirrored beyond its edges.
     """
 
     def __init__(
@@ -51,13 +51,25 @@ class Layer:
                 f"texture must have shape (H, W) or (H, W, C), got {self.texture.shape}"
             )
             raise ValueError(msg)
+        if not np.isfinite(self.texture).all():
+            msg = "texture must be finite, got NaN or infinite pixels"
+            raise ValueError(msg)
         self.opacity: NDArray[np.float64] | None = None
         if opacity is not None:
-            self.opacity = as_floating(opacity, "opacity", np.float64)
+            mask = np.asarray(opacity)
+            if mask.dtype == np.bool_:
+                mask = mask.astype(np.float64)
+            self.opacity = as_floating(mask, "opacity", np.float64)
             if self.opacity.shape != self.texture.shape[:2]:
                 msg = (
                     f"opacity must have shape {self.texture.shape[:2]}, "
                     f"got {self.opacity.shape}"
+                )
+                raise ValueError(msg)
+            if not ((self.opacity >= 0) & (self.opacity <= 1)).all():
+                msg = (
+                    "opacity must be in [0, 1], got values in "
+                    f"[{self.opacity.min()}, {self.opacity.max()}]"
                 )
                 raise ValueError(msg)
 
@@ -112,6 +124,19 @@ class Scene:
     layers: tuple[Layer, ...]
     shape: tuple[int, int]
 
+    def __post_init__(self) -> None:
+        if not self.layers:
+            msg = "layers must hold at least one layer, got none"
+            raise ValueError(msg)
+        channels = {layer.texture.shape[2:] for layer in self.layers}
+        if len(channels) > 1:
+            shapes = [layer.texture.shape for layer in self.layers]
+            msg = f"layers must agree in their channels, got textures {shapes}"
+            raise ValueError(msg)
+        if len(self.shape) != 2 or min(self.shape) < 1:
+            msg = f"shape must be (H >= 1, W >= 1), got {tuple(self.shape)}"
+            raise ValueError(msg)
+
     def points(self) -> NDArray[np.float64]:
         """Return (x, y) of every pixel, px from the middle, (H, W, 2)."""
         height, width = self.shape
@@ -121,15 +146,12 @@ class Scene:
     def render(self, time: float) -> NDArray[np.float64]:
         """Return the picture at ``time``, (H, W) or (H, W, C)."""
         points = self.points()
-        picture: NDArray[np.float64] | None = None
-        for layer in self.layers:
+        back, *others = self.layers
+        picture = back.at(time, points)[0]  # whatever its opacity: nothing is behind
+        for layer in others:
             values, opacity = layer.at(time, points)
-            if picture is None:
-                picture = values
-                continue
             share = opacity[..., None] if values.ndim == 3 else opacity
             picture = picture + share * (values - picture)
-        assert picture is not None
         return picture
 
     def front(self, time: float, points: NDArray[np.float64]) -> NDArray[np.intp]:

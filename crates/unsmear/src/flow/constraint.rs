@@ -13,6 +13,8 @@
 //!
 //! Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), section 4, with soft tests.
 
+use multiversion::multiversion;
+
 use crate::array::for_each_row;
 use crate::control::Control;
 use crate::convolve::gaussian_taps;
@@ -45,6 +47,7 @@ pub(crate) fn constrain<T: Real>(
     let [first, second] = gradients;
     let (first, second) = (first?, second?);
     let [rows, columns] = [height, width].map(|n| coverage(n, pair.bank));
+    let columns: Vec<T> = columns.into_iter().map(T::of).collect();
     // d^2 in units of (tau sigma_k)^2.
     let narrowness = T::of((pair.bank.sigma() / tau).powi(2));
     let floor = T::of(reference * reference);
@@ -58,44 +61,56 @@ pub(crate) fn constrain<T: Real>(
             let [one, other] = pair.responses.map(|r| r.row(filter, y));
             phase_step(one, other, steps);
             let tuned = wavevectors[filter].map(T::of);
-            weigh(&a, &b, tuned, [narrowness, floor], slopes, weights);
-            for (x, weight) in weights.iter_mut().enumerate() {
-                *weight *= row_weight * T::of(columns[x]);
-                if !(*weight > T::zero()) {
-                    // Not only weightless: a NaN must not reach the sums.
-                    (*weight, slopes[x], slopes[width + x]) = (T::zero(), T::zero(), T::zero());
-                }
-            }
+            let (gx, gy) = slopes.split_at_mut(width);
+            weigh(&a, &b, tuned, [narrowness, floor], gx, gy, weights);
+            cover(weights, &columns, row_weight, gx, gy);
         }
     })?;
     Ok(out)
 }
 
 /// `G` and the position-independent part of `W` of a row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn weigh<T: Real>(
     a: &PhaseRow<'_, T>,
     b: &PhaseRow<'_, T>,
     [kx, ky]: [T; 2],
     [narrowness, floor]: [T; 2],
-    slopes: &mut [T],
+    gx: &mut [T],
+    gy: &mut [T],
     weights: &mut [T],
 ) {
+    let n = weights.len();
     let half = T::of(0.5);
-    let (gx, gy) = slopes.split_at_mut(weights.len());
-    for x in 0..weights.len() {
-        gx[x] = half * (a.phi_x[x] + b.phi_x[x]);
-        gy[x] = half * (a.phi_y[x] + b.phi_y[x]);
-        let square = |row: &PhaseRow<'_, T>| {
-            let (dx, dy) = (row.phi_x[x] - kx, row.phi_y[x] - ky);
-            dx * dx + dy * dy
-        };
-        let (one, other) = (square(a), square(b));
+    let (gx, gy) = (&mut gx[..n], &mut gy[..n]);
+    let (a_x, a_y, a_power) = (&a.phi_x[..n], &a.phi_y[..n], &a.power[..n]);
+    let (b_x, b_y, b_power) = (&b.phi_x[..n], &b.phi_y[..n], &b.power[..n]);
+    for x in 0..n {
+        gx[x] = half * (a_x[x] + b_x[x]);
+        gy[x] = half * (a_y[x] + b_y[x]);
+        let one = (a_x[x] - kx) * (a_x[x] - kx) + (a_y[x] - ky) * (a_y[x] - ky);
+        let other = (b_x[x] - kx) * (b_x[x] - kx) + (b_y[x] - ky) * (b_y[x] - ky);
         // A NaN on either side must stay: `max` would lose it.
         let deviation = if one > other || one.is_nan() { one } else { other } * narrowness;
-        let product = (a.power[x] * b.power[x]).sqrt();
-        let alike = (product + product) / (a.power[x] + b.power[x]);
+        let product = (a_power[x] * b_power[x]).sqrt();
+        let alike = (product + product) / (a_power[x] + b_power[x]);
         weights[x] =
             alike * alike / (T::one() + deviation * deviation) * (product / (product + floor));
+    }
+}
+
+/// Weights times the coverage; what is not above 0 after that is silenced.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn cover<T: Real>(weights: &mut [T], columns: &[T], row_weight: T, gx: &mut [T], gy: &mut [T]) {
+    let n = weights.len();
+    let (columns, gx, gy) = (&columns[..n], &mut gx[..n], &mut gy[..n]);
+    for x in 0..n {
+        let weight = weights[x] * (row_weight * columns[x]);
+        let counts = weight > T::zero();
+        // Not only weightless: a NaN must not reach the sums.
+        weights[x] = if counts { weight } else { T::zero() };
+        gx[x] = if counts { gx[x] } else { T::zero() };
+        gy[x] = if counts { gy[x] } else { T::zero() };
     }
 }
 

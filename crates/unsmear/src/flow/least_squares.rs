@@ -36,7 +36,7 @@
 
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 
-use crate::array::{for_each_row, require_frames};
+use crate::array::{for_each_row_with, require_frames};
 use crate::border::Border;
 use crate::component_tests::{ComponentTests, largest_amplitude};
 use crate::control::Control;
@@ -191,15 +191,23 @@ impl LeastSquares {
         let filters = self.gabor.orientations;
         let mut rows = vec![T::zero(); SUMS * height * width];
         let softness = T::of(1.0 / self.robust.powi(2));
-        for_each_row(&mut rows, SUMS * width, control, |y, out| {
-            let flow = solution.map(|s| [0, 1].map(|c| s.slice(ndarray::s![c, y, ..])));
-            for set in &constraints.sets {
-                let row = &set[y * filters * TERMS * width..][..filters * TERMS * width];
-                for constraint in row.chunks(TERMS * width) {
-                    accumulate(constraint, flow.as_ref(), softness, out);
+        let plane = height * width;
+        let known = solution.and_then(|s| s.as_slice());
+        for_each_row_with(
+            &mut rows,
+            SUMS * width,
+            control,
+            || vec![T::zero(); 2 * width],
+            |y, out, scratch| {
+                let flow = known.map(|s| [0, 1].map(|c| &s[c * plane + y * width..][..width]));
+                for set in &constraints.sets {
+                    let row = &set[y * filters * TERMS * width..][..filters * TERMS * width];
+                    for constraint in row.chunks(TERMS * width) {
+                        accumulate(constraint, flow, softness, scratch, out);
+                    }
                 }
-            }
-        })?;
+            },
+        )?;
         let sums = Array3::from_shape_vec((height, SUMS, width), rows).unwrap_or_default();
         let sums = sums.permuted_axes([1, 0, 2]);
         if self.neighbourhood == 0.0 {

@@ -1,5 +1,7 @@
 //! Complex responses of a bank of filters to one picture.
 
+use ndarray::Array4;
+
 use crate::real::Real;
 
 /// Complex responses of `N` filters to a picture (H, W), the rows of all filters side by side so
@@ -28,6 +30,14 @@ impl<T: Real> Responses<T> {
     #[must_use]
     pub fn dim(&self) -> (usize, usize, usize) {
         (self.filters, self.height, self.width)
+    }
+
+    /// Real and imaginary parts of all responses, (2, N, H, W), nothing copied: in memory the rows
+    /// of all filters lie side by side, (H, N, 2, W).
+    #[must_use]
+    pub fn into_array(self) -> Array4<T> {
+        let shape = (self.height, self.filters, 2, self.width);
+        Array4::from_shape_vec(shape, self.data).unwrap_or_default().permuted_axes([2, 1, 0, 3])
     }
 
     /// Real and imaginary parts of row `y` of filter `filter`.
@@ -59,5 +69,14 @@ mod tests {
         assert_eq!(responses.row(1, 2), (&[0.0, 0.0, 0.0, 5.0][..], &[-6.0, 0.0, 0.0, 0.0][..]));
         assert_eq!(responses.packed_mut().iter().filter(|&&s| s != 0.0).count(), 2);
         assert_eq!(responses.dim(), (2, 3, 4));
+    }
+
+    #[test]
+    fn as_an_array_every_sample_keeps_its_place() {
+        let mut responses = Responses::<f32>::zeros(3, 4, 5);
+        responses.row_mut(2, 1).1[4] = 7.0;
+        let array = responses.into_array();
+        assert_eq!((array.shape(), array[(1, 2, 1, 4)]), (&[2, 3, 4, 5][..], 7.0));
+        assert_eq!(array.sum(), 7.0);
     }
 }

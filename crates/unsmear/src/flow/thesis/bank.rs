@@ -20,6 +20,7 @@
 //! Source: C. Texin, "Optical Flow Using Phase Information for Deblurring", MIT 2007, chapter 4.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use crate::error::{Error, Result, require};
 use crate::fourier::{Complex64, Fft2};
@@ -54,6 +55,12 @@ impl Bank {
         Ok(bank)
     }
 
+    /// (height, width) of the pictures and of every filter.
+    #[must_use]
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
     /// Deviation of the window, px and frames.
     #[must_use]
     pub fn sigma(&self) -> f64 {
@@ -80,32 +87,54 @@ impl Bank {
         let y = centred(self.height).map(|y| factor(1.0 - y, sin)).collect::<Vec<_>>();
         let radius = self.sigma.round();
         let middle = [self.height as f64 / 2.0, self.width as f64 / 2.0 - 1.0];
-        let mut kernel = Vec::with_capacity(self.height * self.width);
-        for (row, along_y) in y.iter().enumerate() {
+        let mut kernel = vec![Complex64::default(); self.height * self.width];
+        for row in self.disc_rows() {
             let dy = row as f64 - middle[0];
-            kernel.extend(x.iter().enumerate().map(|(column, along_x)| {
-                let inside = dy.hypot(column as f64 - middle[1]) < radius;
-                if inside { along_y * along_x } else { Complex64::default() }
-            }));
+            let line = &mut kernel[row * self.width..(row + 1) * self.width];
+            for (column, (sample, along_x)) in line.iter_mut().zip(&x).enumerate() {
+                let dx = column as f64 - middle[1];
+                // Squares of halves are exact, so that no tie is decided by rounding.
+                if dy * dy + dx * dx < radius * radius {
+                    *sample = y[row] * along_x;
+                }
+            }
         }
         let sum: Complex64 = kernel.iter().sum();
         kernel.iter_mut().for_each(|sample| *sample /= sum);
         kernel
     }
 
-    /// Whether the bin (row, column) of the spectrum with zero frequency in the middle is kept.
-    #[must_use]
-    pub fn keeps(&self, angle: f64, row: usize, column: usize) -> bool {
+    /// Rows that the disc of the window may reach.
+    pub(super) fn disc_rows(&self) -> Range<usize> {
+        around(self.height as f64 / 2.0, self.sigma.round(), self.height)
+    }
+
+    /// Row and column of the tuning frequency, zero frequency in the middle, and the distance from
+    /// which on bins are dropped.
+    fn kept_disc(&self, angle: f64) -> ([f64; 2], f64) {
         let (sin, cos) = angle.to_radians().sin_cos();
         let (h, w) = (self.height as f64, self.width as f64);
         // `round` goes half away from zero, as the listing's does.
-        let centre_row = (h / 2.0 + 1.0).ceil() - (h * self.frequency * sin).round() - 1.0;
-        let centre_column = (w / 2.0 + 1.0).floor() + (w * self.frequency * cos).round() - 1.0;
-        let distance = (row as f64 - centre_row).hypot(column as f64 - centre_column);
-        distance < (w / self.sigma).ceil()
+        let row = (h / 2.0 + 1.0).ceil() - (h * self.frequency * sin).round() - 1.0;
+        let column = (w / 2.0 + 1.0).floor() + (w * self.frequency * cos).round() - 1.0;
+        ([row, column], (w / self.sigma).ceil())
     }
 
-    /// The filter at `angle` degrees, row-major (H, W); `plan` transforms that shape.
+    /// Rows and columns that hold every kept bin, zero frequency in the middle.
+    pub(super) fn kept_extent(&self, angle: f64) -> (Range<usize>, Range<usize>) {
+        let ([row, column], reach) = self.kept_disc(angle);
+        (around(row, reach, self.height), around(column, reach, self.width))
+    }
+
+    /// Whether the bin (row, column) of the spectrum with zero frequency in the middle is kept.
+    #[must_use]
+    pub fn keeps(&self, angle: f64, row: usize, column: usize) -> bool {
+        let ([centre_row, centre_column], reach) = self.kept_disc(angle);
+        (row as f64 - centre_row).hypot(column as f64 - centre_column) < reach
+    }
+
+    /// The filter at `angle` degrees, row-major (H, W); `plan` transforms that shape. The flow
+    /// takes the shorter way of [`super::pruned`].
     #[must_use]
     pub fn kernel(&self, angle: f64, plan: &Fft2, scratch: &mut Vec<Complex64>) -> Vec<Complex64> {
         let (h, w) = (self.height, self.width);
@@ -131,6 +160,13 @@ impl Bank {
         let sum: f64 = taps.iter().sum();
         taps.into_iter().map(|tap| tap / sum).collect()
     }
+}
+
+/// The positions of `0..n` that may lie nearer than `reach` to `middle`.
+fn around(middle: f64, reach: f64, n: usize) -> Range<usize> {
+    // Casting saturates at 0.
+    let end = ((middle + reach).ceil() as usize).min(n);
+    ((middle - reach).floor() as usize).min(end)..end
 }
 
 /// `-n/2 + 1 ..= n/2` for even `n`, `-(n-1)/2 ..= (n-1)/2` for odd.

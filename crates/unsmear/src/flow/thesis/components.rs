@@ -1,9 +1,9 @@
 //! Component velocities of one founding filter in every frame.
 //!
-//! Given the spatial responses of the frames (T, H, W), in this order:
+//! Given the frames (T, H, W) and the filter `g` in space:
 //!
 //! ```text
-//! R    = responses * Gaussian taps along t             ('same', zero beyond both ends)
+//! R    = (frames * Gaussian taps along t) * g           ('same', zero beyond both ends)
 //! dR   = R * [-1 8 0 -8 1] / 12 along x, y and t        ('same', zero beyond the edges)
 //! grad phi = Im(conj(R) dR) / |R|^2
 //! (un, vn) = -phi_t (phi_x, phi_y) / (phi_x^2 + phi_y^2)                       px/frame
@@ -13,11 +13,10 @@
 //! frame and 5/12 at the others, one of the reasons for speeds that are far too low.
 
 use multiversion::multiversion;
-use ndarray::{Array2, Array3, Zip};
+use ndarray::Array3;
 
 use crate::control::Control;
 use crate::error::Result;
-use crate::fourier::Complex64;
 
 /// Complex responses (T, H, W), real and imaginary parts apart.
 #[derive(Debug, Clone)]
@@ -28,21 +27,36 @@ pub struct Response {
     pub im: Array3<f64>,
 }
 
-/// 'Same' convolution of the spatial responses with `taps` along the frames.
+impl Response {
+    /// All responses 0.
+    #[must_use]
+    pub fn zeros(shape: (usize, usize, usize)) -> Self {
+        Self { re: Array3::zeros(shape), im: Array3::zeros(shape) }
+    }
+
+    /// Real and imaginary part of each frame, packed.
+    pub(super) fn frames_mut(&mut self) -> impl Iterator<Item = [&mut [f64]; 2]> {
+        let (_, height, width) = self.re.dim();
+        let frame = (height * width).max(1);
+        let [re, im] = [&mut self.re, &mut self.im]
+            .map(|part| part.as_slice_mut().unwrap_or_default().chunks_mut(frame));
+        re.zip(im).map(|(re, im)| [re, im])
+    }
+}
+
+/// 'Same' convolution of the frames (T, H, W) with `taps` along t. It commutes with the filters in
+/// space, and on real frames it is done once for all of them.
 #[must_use]
-pub fn filter_in_time(responses: &[Array2<Complex64>], taps: &[f64]) -> Response {
-    let (height, width) = responses.first().map_or((0, 0), Array2::dim);
-    let shape = (responses.len(), height, width);
-    let (mut re, mut im) = (Array3::zeros(shape), Array3::zeros(shape));
-    for (t, (mut re, mut im)) in re.outer_iter_mut().zip(im.outer_iter_mut()).enumerate() {
-        for (s, response) in responses.iter().enumerate() {
+pub fn filter_in_time(frames: &Array3<f64>, taps: &[f64]) -> Array3<f64> {
+    let mut filtered = Array3::zeros(frames.raw_dim());
+    for (t, mut filtered) in filtered.outer_iter_mut().enumerate() {
+        for (s, frame) in frames.outer_iter().enumerate() {
             let lag = (t + taps.len() / 2).checked_sub(s);
             let Some(&tap) = lag.and_then(|lag| taps.get(lag)) else { continue };
-            re.zip_mut_with(response, |sum, r| *sum += tap * r.re);
-            im.zip_mut_with(response, |sum, r| *sum += tap * r.im);
+            filtered.zip_mut_with(&frame, |sum, sample| *sum += tap * sample);
         }
     }
-    Response { re, im }
+    filtered
 }
 
 /// `un` and `vn` in every frame (T, H, W), px/frame; NaN where there is no phase.
@@ -50,12 +64,19 @@ pub fn filter_in_time(responses: &[Array2<Complex64>], taps: &[f64]) -> Response
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn component_velocities(response: &Response, control: &Control) -> Result<[Array3<f64>; 2]> {
-    let [mut un, mut vn, phi_t] = phase_gradient(response, control)?;
-    Zip::from(&mut un).and(&mut vn).and(&phi_t).for_each(|phi_x, phi_y, phi_t| {
-        let scale = -phi_t / (*phi_x * *phi_x + *phi_y * *phi_y);
-        *phi_x *= scale;
-        *phi_y *= scale;
-    });
+    let shape = response.re.dim();
+    let [mut un, mut vn] = [(); 2].map(|()| Array3::zeros(shape));
+    let mut phi_t = vec![0.0; shape.2];
+    let rows = un.rows_mut().into_iter().zip(vn.rows_mut());
+    let places = (0..shape.0).flat_map(|t| (0..shape.1).map(move |y| (t, y)));
+    let mut rates = PhaseRates::new(response);
+    for ((t, y), (mut un, mut vn)) in places.zip(rows) {
+        control.check()?;
+        let (un, vn) =
+            (un.as_slice_mut().unwrap_or_default(), vn.as_slice_mut().unwrap_or_default());
+        rates.of_row(t, y, [un, vn, &mut phi_t]);
+        along_the_normal(un, vn, &phi_t);
+    }
     Ok([un, vn])
 }
 
@@ -66,18 +87,46 @@ pub fn component_velocities(response: &Response, control: &Control) -> Result<[A
 pub fn phase_gradient(response: &Response, control: &Control) -> Result<[Array3<f64>; 3]> {
     let (frames, height, width) = response.re.dim();
     let mut phi = [(); 3].map(|()| vec![0.0; frames * height * width]);
-    let zeros = vec![0.0; width];
-    let mut padded = [vec![0.0; width + 4], vec![0.0; width + 4]];
-    let parts = [&response.re, &response.im].map(|part| part.as_slice().unwrap_or_default());
-    let row = |t: Option<usize>, y: Option<usize>| match (t, y) {
-        (Some(t), Some(y)) if t < frames && y < height => {
-            parts.map(|part| &part[(t * height + y) * width..][..width])
-        }
-        _ => [zeros.as_slice(); 2],
-    };
+    let mut rates = PhaseRates::new(response);
     for (t, y) in (0..frames).flat_map(|t| (0..height).map(move |y| (t, y))) {
         control.check()?;
+        let at = (t * height + y) * width;
+        rates.of_row(t, y, phi.each_mut().map(|phi| &mut phi[at..at + width]));
+    }
+    let shape = (frames, height, width);
+    Ok(phi.map(|phi| Array3::from_shape_vec(shape, phi).unwrap_or_default()))
+}
+
+/// The phase gradient, row by row.
+struct PhaseRates<'a> {
+    parts: Row<'a>,
+    shape: (usize, usize, usize),
+    zeros: Vec<f64>,
+    padded: [Vec<f64>; 2],
+}
+
+impl<'a> PhaseRates<'a> {
+    fn new(response: &'a Response) -> Self {
+        let width = response.re.dim().2;
+        Self {
+            parts: [&response.re, &response.im].map(|part| part.as_slice().unwrap_or_default()),
+            shape: response.re.dim(),
+            zeros: vec![0.0; width],
+            padded: [vec![0.0; width + 4], vec![0.0; width + 4]],
+        }
+    }
+
+    fn of_row(&mut self, t: usize, y: usize, phi: [&mut [f64]; 3]) {
+        let (frames, height, width) = self.shape;
+        let (parts, zeros) = (self.parts, self.zeros.as_slice());
+        let row = |t: Option<usize>, y: Option<usize>| match (t, y) {
+            (Some(t), Some(y)) if t < frames && y < height => {
+                parts.map(|part| &part[(t * height + y) * width..][..width])
+            }
+            _ => [zeros; 2],
+        };
         let here = row(Some(t), Some(y));
+        let padded = &mut self.padded;
         padded.iter_mut().zip(here).for_each(|(p, row)| p[2..2 + width].copy_from_slice(row));
         let step = |position: usize, by: isize| position.checked_add_signed(by);
         let neighbours = [
@@ -85,12 +134,10 @@ pub fn phase_gradient(response: &Response, control: &Control) -> Result<[Array3<
             [-2, -1, 1, 2].map(|by| row(Some(t), step(y, by))),
             [-2, -1, 1, 2].map(|by| row(step(t, by), Some(y))),
         ];
-        for (phi, along) in phi.iter_mut().zip(neighbours) {
-            phase_rate(here, along, &mut phi[(t * height + y) * width..][..width]);
+        for (phi, along) in phi.into_iter().zip(neighbours) {
+            phase_rate(here, along, phi);
         }
     }
-    let shape = (frames, height, width);
-    Ok(phi.map(|phi| Array3::from_shape_vec(shape, phi).unwrap_or_default()))
 }
 
 /// Real and imaginary part of a row.
@@ -100,6 +147,18 @@ type Row<'a> = [&'a [f64]; 2];
 #[inline(always)]
 fn cut(rows: [Row<'_>; 4], n: usize) -> [Row<'_>; 4] {
     rows.map(|[re, im]| [&re[..n], &im[..n]])
+}
+
+/// Turns `phi_x`, `phi_y` into the velocity along them.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn along_the_normal(phi_x: &mut [f64], phi_y: &mut [f64], phi_t: &[f64]) {
+    let n = phi_t.len();
+    let (phi_x, phi_y) = (&mut phi_x[..n], &mut phi_y[..n]);
+    for x in 0..n {
+        let scale = -phi_t[x] / (phi_x[x] * phi_x[x] + phi_y[x] * phi_y[x]);
+        phi_x[x] *= scale;
+        phi_y[x] *= scale;
+    }
 }
 
 /// Five-point derivative from the samples at -2, -1, 1 and 2.
@@ -144,10 +203,8 @@ mod tests {
 
     #[test]
     fn time_filter_is_a_same_convolution() {
-        let frames: Vec<_> =
-            (0..3).map(|t| Array2::from_elem((1, 1), Complex64::new(f64::from(t), 1.0))).collect();
-        let response = filter_in_time(&frames, &[0.25, 0.5, 0.25]);
-        assert_eq!(response.re.as_slice().unwrap(), [0.25, 1.0, 1.25]);
-        assert_eq!(response.im.as_slice().unwrap(), [0.75, 1.0, 0.75]);
+        let frames = Array3::from_shape_fn((3, 1, 2), |(t, _, x)| (t + 4 * x) as f64);
+        let filtered = filter_in_time(&frames, &[0.25, 0.5, 0.25]);
+        assert_eq!(filtered.as_slice().unwrap(), [0.25, 3.25, 1.0, 5.0, 1.25, 4.25]);
     }
 }

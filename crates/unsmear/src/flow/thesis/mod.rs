@@ -1,7 +1,7 @@
 //! Optical flow of the founding method, number by number: the yardstick, not a recommendation.
 //!
 //! ```text
-//! frames (T, H, W) -> [bank] R of N filters -> [components] (un, vn) (N, T, H, W)
+//! frames (T, H, W) -> [bank, pruned] R of N filters -> [components] (un, vn) (N, T, H, W)
 //!                  -> [gated_mean] over filters (T, H, W) -> over frames (H, W) = (u, v)
 //! ```
 //!
@@ -14,20 +14,21 @@
 use ndarray::{Array2, Array3, ArrayView3, s};
 use rayon::prelude::*;
 
-use crate::array::require_frames;
+use crate::array::{for_each_row_with, require_frames};
 use crate::control::Control;
 use crate::error::Result;
 use crate::fft_convolve::{FftConvolver, FftScratch};
 use crate::flow_field::FlowField;
-use crate::fourier::Fft2;
 
 pub mod bank;
 pub mod components;
 pub mod gated_mean;
+pub mod pruned;
 
 use bank::Bank;
 use components::{Response, component_velocities, filter_in_time};
 use gated_mean::GatedMean;
+use pruned::PrunedSpectrum;
 
 /// What happens to static pixels, those whose central time difference is exactly 0 in every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -80,24 +81,31 @@ impl ThesisFlow {
         frames: ArrayView3<'_, f64>,
         control: &Control,
     ) -> Result<FlowField<f64>> {
-        let (_, height, width) = frames.dim();
+        let (count, height, width) = frames.dim();
         let components = self.components(frames, control)?;
-        let mut over_filters = vec![0.0; components.len()];
-        let mut over_frames = vec![0.0; frames.len_of(ndarray::Axis(0))];
-        let mut flow = FlowField::unknown((height, width));
-        for part in 0..2 {
-            let out = if part == 0 { &mut flow.u } else { &mut flow.v };
-            for ((y, x), out) in out.indexed_iter_mut() {
-                for (t, mean) in over_frames.iter_mut().enumerate() {
-                    for (value, component) in over_filters.iter_mut().zip(&components) {
-                        *value = component[part][(t, y, x)];
+        let [u, v] = [0, 1].map(|part| {
+            let mut out = vec![0.0; height * width];
+            for_each_row_with(
+                &mut out,
+                width,
+                control,
+                || vec![0.0; count * width],
+                |y, out, over_filters| {
+                    for (t, mean) in over_filters.chunks_mut(width).enumerate() {
+                        let at = (t * height + y) * width;
+                        let rows: Vec<&[f64]> = components
+                            .iter()
+                            .map(|c| &c[part].as_slice().unwrap_or_default()[at..at + width])
+                            .collect();
+                        self.gate.of_rows(&rows, mean);
                     }
-                    *mean = self.gate.of(&mut over_filters);
-                }
-                *out = self.gate.of(&mut over_frames);
-            }
-        }
-        Ok(flow)
+                    let frames: Vec<&[f64]> = over_filters.chunks(width).collect();
+                    self.gate.of_rows(&frames, out);
+                },
+            )?;
+            Ok(Array2::from_shape_vec((height, width), out).unwrap_or_default())
+        });
+        FlowField::new(u?, v?)
     }
 
     /// Component velocities `[un, vn]`, each (T, H, W) px/frame, of every filter.
@@ -139,30 +147,32 @@ impl ThesisFlow {
         }
         let (count, height, width) = pictures.dim();
         let bank = Bank::new(height, width, frequency, self.bandwidth_octaves)?;
-        let plan = Fft2::new(height, width);
+        let pruned = PrunedSpectrum::new(height, width);
         let convolver = FftConvolver::new(height, width, [height / 2, width / 2])?;
+        // The filter in time commutes with those in space: once here instead of once per filter.
+        let pictures = filter_in_time(&pictures, &bank.temporal_taps(count));
         let spectra = (0..count)
             .into_par_iter()
             .map_init(FftScratch::default, |scratch, t| {
                 convolver.spectrum(pictures.slice(s![t, .., ..]), scratch, control)
             })
             .collect::<Result<Vec<_>>>()?;
-        let taps = bank.temporal_taps(count);
         let angles = bank.angles();
         control.expect(angles.len());
         angles
             .into_par_iter()
-            .map_init(FftScratch::default, |scratch, angle| {
-                let kernel = bank.kernel(angle, &plan, &mut scratch.transform);
-                let kernel = convolver.kernel_spectrum(&kernel, scratch, control)?;
-                let responses = spectra
-                    .iter()
-                    .map(|frame| convolver.convolve(frame, &kernel, scratch, control))
-                    .collect::<Result<Vec<_>>>()?;
-                let result = stage(&filter_in_time(&responses, &taps))?;
-                control.advance()?;
-                Ok(result)
-            })
+            .map_init(
+                || (FftScratch::default(), Response::zeros((count, height, width))),
+                |(scratch, response), angle| {
+                    let kernel = pruned.of(&bank, angle, &mut scratch.transform);
+                    for (spectrum, out) in spectra.iter().zip(response.frames_mut()) {
+                        convolver.convolve(spectrum, &kernel, out, scratch, control)?;
+                    }
+                    let result = stage(response)?;
+                    control.advance()?;
+                    Ok(result)
+                },
+            )
             .collect()
     }
 
