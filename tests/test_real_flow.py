@@ -60,12 +60,12 @@ def test_least_squares_beats_the_founding_method_threefold(
 ) -> None:
     frames, truth, land = yosemite
     founding = unsmear.metrics.flow_errors(flow(frames[6:9], "thesis"), truth, land)
-    r = unsmear.optical_flow(frames[4:11], index=3)
+    r = unsmear.optical_flow(frames[4:11], index=3, method="least-squares")
     errors = unsmear.metrics.flow_errors(r.flow, truth, land)
     assert errors["density"] > 0.99
     assert errors["aae"] < founding["aae"] / 3
     assert errors["aae"] <= 2.6
-    three = unsmear.optical_flow(frames[6:9], index=1)
+    three = unsmear.optical_flow(frames[6:9], index=1, method="least-squares")
     three_errors = unsmear.metrics.flow_errors(three.flow, truth, land)
     assert three_errors["aae"] < founding["aae"] / 3
 
@@ -98,7 +98,9 @@ def test_error_falls_as_confidence_rises(
 def test_translating_tree(test_data: Item) -> None:
     folder = test_data("barron/translating_tree")
     truth = unsmear.read_flow(folder / "flow_20.flo")
-    r = unsmear.optical_flow(sequence(folder, range(17, 24)), index=3)
+    r = unsmear.optical_flow(
+        sequence(folder, range(17, 24)), index=3, method="least-squares"
+    )
     errors = unsmear.metrics.flow_errors(r.flow, truth)
     assert errors["density"] > 0.99
     assert errors["aae"] <= 1.0

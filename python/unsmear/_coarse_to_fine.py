@@ -63,7 +63,9 @@ def estimate(
         raise ValueError(msg)
     reach = values["frames_each_side"]
     first = max(0, reference - reach)
-    used = as_floating(array[first : reference + max(reach, 1) + 1], "frames", np.float64)
+    used = as_floating(
+        array[first : reference + max(reach, 1) + 1], "frames", np.float64
+    )
     guide = None
     if channel_axis is not None:
         colour = used[reference - first]

@@ -9,6 +9,7 @@ use crate::threads::run;
 
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
+#[allow(clippy::struct_excessive_bools, reason = "as the core's")]
 pub(crate) struct Items {
     pyramid_factor: f64,
     coarsest_side: f64,

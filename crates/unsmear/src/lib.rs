@@ -9,16 +9,29 @@
 //! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
-//! | 5 | [`gabor`] | filters tuned to a wavevector, complex responses |
+//! | 4 | [`pyramid`], `spline_filter`, [`median`], [`immerkaer_noise`] | sizes of pictures; splines; median; noise |
+//! | 4 | `sor::system`, `weighted_median::middle`, `weighted_median::parameters` | parts of the two below |
+//! | 5 | `sor::layout`, `weighted_median::window` | |
+//! | 6 | `sor::relax` | |
+//! | 7 | [`sor`], [`weighted_median`] | solver of the default flow; median with weights |
+//! | 8 | `sor::tests`, `weighted_median::tests` | |
+//! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
 //! | 7 | [`phase_gradient`] | phase in space |
 //! | 8 | [`component_velocity`] | what one filter sees of the motion |
 //! | 8 | [`flow`], [`flow::thesis::bank`] | an estimate of flow, with confidence; the founding filters |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
+//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::rows`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence` | parts of the default flow |
+//! | 10 | `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
+//! | 11 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still` | |
+//! | 12 | `flow::coarse_to_fine::level` | one scale |
+//! | 13 | `flow::coarse_to_fine::refine`, `flow::coarse_to_fine::frames`, `flow::coarse_to_fine::noise_rule` | |
+//! | 14 | `flow::coarse_to_fine::schedule` | from coarse to fine |
+//! | 15 | [`flow::coarse_to_fine`] | the default flow |
 //! | 9 | [`flow::thesis::components`], [`flow::thesis::gated_mean`], [`flow::thesis::pruned`] | parts of the founding method |
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
-//! | 11 | [`psf`], `streamline`, `local_spline`, `spline_filter`, [`noise`] | kernels and paths of motion; sampling; noise |
-//! | 12 | [`interpolate`], [`blur`] | pictures between pixels, warping; the forward operator |
+//! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
+//! | 12 | [`blur`] | the forward operator |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |

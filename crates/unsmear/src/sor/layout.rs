@@ -11,7 +11,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::SorSystem;
+use super::system::SorSystem;
 use crate::control::Control;
 use crate::error::Result;
 

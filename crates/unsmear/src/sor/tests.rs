@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::error::Error;
 
 /// A system of random equations and a start.
 #[derive(Debug, Clone)]

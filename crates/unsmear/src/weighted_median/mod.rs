@@ -15,6 +15,7 @@
 //! [10.1109/CVPR.2010.5539939](https://doi.org/10.1109/CVPR.2010.5539939), section 5 (without its occlusion term).
 
 mod middle;
+mod parameters;
 mod window;
 
 use rayon::prelude::*;
@@ -23,26 +24,10 @@ use crate::control::Control;
 use crate::error::{Error, Result, require};
 use window::{Window, Workspace};
 
+pub use parameters::WeightedMedian;
+
 /// Largest radius, px: a window beyond it smears more than it decides, and the sums of its weights stay below 2^24.
 const LARGEST_RADIUS: usize = 15;
-
-/// Window and weights of [`weighted_median`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WeightedMedian {
-    /// Half side of the window, px, in 1..=15; by default 5, which spans the two sides of a boundary.
-    pub radius: usize,
-    /// Standard deviation of the spatial weight, px, > 0; by default 4, so that the window's corners still count.
-    pub spatial_sigma: f32,
-    /// Standard deviation of the weight of guide differences, in units of the guide, > 0; by default 8 grey levels,
-    /// above the noise and below the contrast of objects.
-    pub guide_sigma: f32,
-}
-
-impl Default for WeightedMedian {
-    fn default() -> Self {
-        Self { radius: 5, spatial_sigma: 4.0, guide_sigma: 8.0 }
-    }
-}
 
 /// Filters (`u`, `v`) where `mask` holds and copies the rest; see the [module](self).
 ///

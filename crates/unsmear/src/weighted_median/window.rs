@@ -6,8 +6,8 @@
 
 use multiversion::multiversion;
 
-use super::WeightedMedian;
 use super::middle::{RUN, weighted_middles};
+use super::parameters::WeightedMedian;
 
 /// Samples of a vector register of 512 bits, in f32.
 const LANES: usize = 16;

@@ -15,7 +15,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Coefficients of the least-maximum fit on [0, 1], lowest power first.
 const COEFFICIENTS: [f32; 6] =
-    [0.99997735, -0.332_624_4, 0.193_542_69, -0.116_417_62, 0.052_626_595, -0.011_708_041];
+    [0.999_977_35, -0.332_624_4, 0.193_542_69, -0.116_417_62, 0.052_626_595, -0.011_708_041];
 
 /// `atan2(y, x)`, rad in [-pi, pi]; error below 3e-6 rad.
 #[inline(always)]

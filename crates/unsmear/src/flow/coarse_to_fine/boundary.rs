@@ -12,7 +12,7 @@ use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 
-use super::data_term::Planes;
+use super::rows::Planes;
 
 /// Growth of the mask, px to each side.
 const GROWTH: usize = 2;

@@ -6,13 +6,13 @@
 //! ```text
 //! E(w)  = G_3 * sum W_0 (1 - q cos D) / (G_3 * sum W_0 + 0.05)
 //! W_0   = w a_0^2/(a_0^2 + r^2),   q cos D = 2 Re(conj(R_0) R_1)/(a_0^2 + a_1^2)
-//! delta = -(G_8 * s sum W G G' + 0.01 I)^-1 (G_8 * s sum W G D)          px/frame, at w_S
+//! delta = -(G_8 * s sum w G G' + 0.01 I)^-1 (G_8 * s sum w G D),  w = W/(1 + (D/r_s)^2)      px/frame, at w_S
 //! ```
 //!
 //! `w_2` wins everywhere when the mean of `E(w_S)` exceeds that of `E(w_2)` by more than
 //! [`WORST_RATIO`] (objects that turn, occlusion), or when the mean `|delta|` exceeds
 //! [`WORST_BIAS`] (acceleration: small errors that all point the same way). Else `w_S` holds wherever
-//! `E(w_S) < 2 E(w_2) + 0.005`. `G_s *` is a Gaussian average of deviation s px.
+//! `E(w_S) < 2 E(w_2) + 0.02`. `G_s *` is a Gaussian average of deviation s px.
 
 use ndarray::{Array2, Zip};
 
@@ -30,6 +30,8 @@ const WORST_RATIO: f64 = 1.15;
 const WORST_BIAS: f64 = 0.045;
 /// Deviation of the average of the mismatch and of the bias, px.
 const SIGMA: [f64; 2] = [3.0, 8.0];
+/// Mismatch by which several frames may always be worse: what noise does to the fit of one frame.
+const SLACK: f32 = 0.02;
 /// Mismatch of which nobody is to be blamed.
 const SMALL: f64 = 1e-3;
 
@@ -50,6 +52,8 @@ pub(super) struct Explanation<'a> {
     pub(super) floor: f32,
     /// `s`.
     pub(super) scale: f32,
+    /// `r_s`, rad.
+    pub(super) residual: f32,
 }
 
 /// Measures `E` and the bias.
@@ -96,7 +100,8 @@ fn bias(seen: &Explanation<'_>, control: &Control) -> Result<f64> {
             for terms in row.chunks_exact(TERMS * width) {
                 for (x, out) in out.iter_mut().enumerate() {
                     let [gx, gy, d, w] = [0, 1, 2, 3].map(|term| terms[term * width + x]);
-                    *out += seen.scale * w * term([gx, gy, d]);
+                    let r = d / seen.residual;
+                    *out += seen.scale * w / (1.0 + r * r) * term([gx, gy, d]);
                 }
             }
         })?;
@@ -124,7 +129,7 @@ pub(super) fn several_hold(two: &Mismatch, several: &Mismatch) -> Array2<bool> {
     let help = ratio <= WORST_RATIO && several.bias <= WORST_BIAS;
     Zip::from(&two.map)
         .and(&several.map)
-        .map_collect(|two, several| help && *several < 2.0 * two + 0.005)
+        .map_collect(|two, several| help && *several < 2.0 * two + SLACK)
 }
 
 /// The flow and confidence of `several` where `hold`, else of `two`.

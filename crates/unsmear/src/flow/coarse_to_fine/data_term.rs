@@ -15,7 +15,7 @@
 use multiversion::multiversion;
 
 use super::phase_constraint::TERMS;
-use super::rows::for_each_rows;
+use super::rows::{Planes, for_each_rows};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -43,9 +43,6 @@ pub(super) struct Reweighting {
     pub(super) residual: f32,
     pub(super) scale: f32,
 }
-
-/// Flow as two planes.
-pub(super) type Planes<'a> = [&'a [f32]; 2];
 
 /// Computes the equations at `flow` from the constraints of each frame, warped with `warped_with`.
 ///

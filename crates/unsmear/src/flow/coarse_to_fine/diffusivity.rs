@@ -17,8 +17,7 @@
 
 use multiversion::multiversion;
 
-use super::data_term::Planes;
-use super::rows::for_each_rows;
+use super::rows::{Planes, for_each_rows};
 use crate::control::Control;
 use crate::error::Result;
 

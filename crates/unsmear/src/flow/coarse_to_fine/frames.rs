@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 
 use super::contrast::Contrast;
 use super::known::{coverage, fill};
-use super::refine::Frame;
+use super::level::Frame;
 use crate::array::{require_frames, require_same};
 use crate::control::Control;
 use crate::error::{Error, Result};

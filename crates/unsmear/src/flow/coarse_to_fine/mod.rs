@@ -32,6 +32,7 @@ mod evidence;
 mod frames;
 mod guide;
 mod known;
+mod level;
 mod noise_rule;
 mod parameters;
 mod phase_constraint;
@@ -48,8 +49,8 @@ use contrast::Contrast;
 use evidence::LEAST_EVIDENCE;
 use frames::{FramePyramid, Plan};
 use guide::EdgeRule;
+use level::Settings;
 use noise_rule::adapt;
-use refine::Settings;
 use schedule::{Climb, Summit, enlarge};
 
 /// Confidence of a flow that is known and deserves none.

@@ -13,7 +13,7 @@
 //! subtracted is the reading of clean photographs; 1.4 turns standardised grey levels into those of
 //! the four photographs (standard deviation 32 to 54) whose best `alpha` the rule follows.
 
-use super::refine::Settings;
+use super::level::Settings;
 use crate::control::Control;
 use crate::error::Result;
 use crate::immerkaer_noise::immerkaer_noise;

@@ -7,6 +7,7 @@ use crate::error::{Result, require};
 
 /// Parameters of [`super`]; lengths in px of the respective level.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::struct_excessive_bools, reason = "independent switches, each on its own")]
 pub struct CoarseToFine {
     /// Ratio of the sizes of neighbouring levels, in [0.4, 0.95].
     pub pyramid_factor: f64,

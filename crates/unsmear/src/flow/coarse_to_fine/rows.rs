@@ -11,6 +11,9 @@ use crate::error::Result;
 /// Rows per task; see [`crate::array`].
 const ROWS_PER_TASK: usize = 8;
 
+/// Two packed planes (H, W): the components of a flow, or weights along x and along y.
+pub(super) type Planes<'a> = [&'a [f32]; 2];
+
 /// Runs `row(y, rows)` for every row of `N` packed planes with rows of `widths` samples.
 ///
 /// # Errors

@@ -11,7 +11,7 @@ use ndarray::Array2;
 
 use super::evidence::{confidence, gather};
 use super::frames::FramePyramid;
-use super::refine::{Level, Settings};
+use super::level::{Level, Settings};
 use super::still::spring;
 use crate::control::Control;
 use crate::error::Result;
