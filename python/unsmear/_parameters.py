@@ -6,7 +6,51 @@ from typing import Any
 
 # What each name means and why it has this value is told by `unsmear.optical_flow` and,
 # with the equations, by the core.
+_BALANCED: dict[str, Any] = {
+    "pyramid_factor": 0.5,
+    "coarsest_side": 16.0,
+    "finest_level": 0,
+    "warps": 6,
+    "finest_warps": 2,
+    "passes": 2,
+    "sweeps": 10,
+    "smoothness": 0.1,
+    "edge_sensitivity": 2.0,
+    "strongest_channel": False,
+    "residual_scale": 1.0,
+    "tau": 1.25,
+    "amplitude_fraction": 0.05,
+    "amplitude_floor": 0.25,
+    "median_radius": 5,
+    "guide_sigma": 8.0,
+    "frames_each_side": 0,
+    "choose_frames": False,
+    "adapt_to_noise": True,
+    "static_evidence": True,
+}
+
 PARAMETERS: dict[str, dict[str, Any]] = {
+    "fast": _BALANCED | {"finest_level": 1, "warps": 5},
+    "balanced": _BALANCED,
+    "accurate": _BALANCED
+    | {
+        "pyramid_factor": 0.75,
+        "warps": 3,
+        "passes": 3,
+        "sweeps": 15,
+        "smoothness": 0.11,
+        "edge_sensitivity": 2.5,
+        "strongest_channel": True,
+        "residual_scale": 0.7,
+    },
+    "steady": _BALANCED
+    | {
+        "smoothness": 0.08,
+        "edge_sensitivity": 1.0,
+        "residual_scale": 0.5,
+        "frames_each_side": 3,
+        "choose_frames": True,
+    },
     "least-squares": {
         "tuning_frequency": 0.12,
         "bandwidth_octaves": 0.8,

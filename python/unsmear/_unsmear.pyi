@@ -20,6 +20,7 @@ __all__ = [
     "__version__",
     "blur_f32",
     "blur_f64",
+    "coarse_to_fine",
     "component_velocities",
     "correlate_separable",
     "error_map",
@@ -66,6 +67,15 @@ def gabor_planes(
 def correlate_separable(
     volume: _Double, taps: Sequence[Sequence[float]], border: str
 ) -> _Double: ...
+def coarse_to_fine(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    guide: _Double | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    progress: _Progress | None = None,
+) -> tuple[_Single, _Single]: ...
 @overload
 def least_squares(
     frames: _Double,

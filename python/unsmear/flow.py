@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from unsmear import _unsmear
+from unsmear import _coarse_to_fine, _unsmear
 from unsmear._arrays import as_grey_frames
 from unsmear._parameters import PARAMETERS, merged
 from unsmear._progress import of_steps
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FlowResult", "optical_flow"]
 
+_COARSE_TO_FINE = ("fast", "balanced", "accurate", "steady")
 _LEAST_FRAMES = {"least-squares": 2, "fleet-jepson": 3, "thesis": 2}
 
 
@@ -52,7 +53,8 @@ def optical_flow(
     frames: ArrayLike,
     *,
     index: int | None = None,
-    method: str = "least-squares",
+    method: str = "balanced",
+    mask: ArrayLike | None = None,
     channel_axis: int | None = None,
     progress: Progress | None = None,
     **parameters: Any,
@@ -71,23 +73,64 @@ def optical_flow(
     index : int, optional
         Frame whose motion (to the next frame) is measured; default ``(T - 1) // 2``.
         Negative values count from the end. "thesis" pools all frames and ignores it.
-    method : {"least-squares", "fleet-jepson", "thesis"}
+    method : {"balanced", "fast", "accurate", "steady", "least-squares", \
+"fleet-jepson", "thesis"}
+        - "balanced": two frames, ``index`` and the next, over a pyramid with
+          edge-preserving smoothness; any speed, every pixel. The default because it is
+          accurate on all kinds of scenes and takes a fraction of a second.
+        - "fast": the same, stopped at half the resolution; a quarter of the time.
+        - "accurate": the same with finer steps of the pyramid; twice the time.
+        - "steady": up to 3 frames on each side, for motion that is constant over them;
+          where it is not (measured, not assumed) the result is that of two frames.
         - "least-squares": phase differences of neighbouring frames, local least squares
           at one scale; 2 frames are enough, about 7 are best, motion up to 4 px/frame.
-          The default because it answers nearly everywhere.
         - "fleet-jepson": 22 velocity-tuned filters and local affine least squares; 3
           frames at least, 15 fill its windows. More exact, and silent (NaN) where its
           tests fail, often on half of a picture.
         - "thesis": the founding method, flaws included (speeds come out at a tenth to a
           fifth of the truth); for comparison with published figures only.
+    mask : array_like of bool, shape (H, W), optional
+        Pixels of all frames that may be used. Pixels outside take no part, nor do
+        samples that are NaN or infinite; their flow is that of their surroundings, or
+        NaN where these tell nothing. Coarse-to-fine methods only.
     channel_axis : int, optional
-        Axis of the 3 colour channels; they are reduced to Rec. 601 luma. A shape never
-        decides: without it, frames have three axes.
+        Axis of the 3 colour channels; they are reduced to Rec. 601 luma, and the
+        coarse-to-fine methods let their edges break the flow. A shape never decides:
+        without it, frames have three axes.
     progress : callable, optional
         Called with the share done in [0, 1]; an exception it raises cancels the call.
     **parameters
-        Parameters of the method. Common to all: ``tuning_frequency`` (cycles/px, in
-        (0, 0.5)), ``bandwidth_octaves``.
+        Parameters of the method.
+
+        "balanced" (others below): ``pyramid_factor=0.5`` (ratio of the sizes of
+        levels), ``coarsest_side=16.0`` (px: shorter side of the smallest level),
+        ``finest_level=0`` (levels left out at the fine end), ``warps=6`` and
+        ``finest_warps=2`` (refinements per level and on the finest, where most is
+        known already), ``passes=2`` and ``sweeps=10`` (rounds of reweighting per warp
+        and of the solver per round; more changes the error by less than 1 %),
+        ``smoothness=0.1`` (weight against the data; more for noise, less for fine
+        detail), ``edge_sensitivity=2.0`` (how far edges of the picture let the flow
+        break; 0 not at all), ``strongest_channel=False`` (edges by the channel that
+        shows them best, not the rms of all), ``residual_scale=1.0`` (rad: where a
+        constraint loses half its weight), ``tau=1.25`` (deviations off the tuned
+        frequency where weights halve), ``amplitude_fraction=0.05`` (of the rms
+        amplitude) plus ``amplitude_floor=0.25`` (where weights halve; grey levels of a
+        picture with a standard deviation of 64), ``median_radius=5`` (px, of the
+        weighted median at motion boundaries; 0 leaves it out), ``guide_sigma=8.0``
+        (grey levels it tolerates), ``frames_each_side=0`` (0: two frames),
+        ``choose_frames=False`` (fall back to two frames where more disagree),
+        ``adapt_to_noise=True`` (smooth more and trust edges less in a noisy picture),
+        ``static_evidence=True`` (hold still what the frames show to rest).
+
+        "fast" differs by ``finest_level=1``, ``warps=5``; "accurate" by
+        ``pyramid_factor=0.75``, ``warps=3``, ``passes=3``, ``sweeps=15``,
+        ``smoothness=0.11``, ``edge_sensitivity=2.5``, ``strongest_channel=True``,
+        ``residual_scale=0.7``; "steady" by ``smoothness=0.08``,
+        ``edge_sensitivity=1.0``, ``residual_scale=0.5``, ``frames_each_side=3``,
+        ``choose_frames=True``.
+
+        The others have ``tuning_frequency`` (cycles/px, in (0, 0.5)) and
+        ``bandwidth_octaves``.
 
         "least-squares": ``tuning_frequency=0.12`` (sees half a wavelength, 4.2 px),
         ``bandwidth_octaves=0.8``, ``orientations=6``, ``support=3.0`` (deviations of
@@ -116,7 +159,8 @@ def optical_flow(
     ------
     ValueError
         Too few frames or too small, ``index`` out of range, samples that are not
-        finite, an unknown method or parameter, or a value out of range.
+        finite (unless the method is coarse-to-fine), ``mask`` of another shape or for
+        another method, an unknown method or parameter, or a value out of range.
     TypeError
         ``frames`` are not real numbers, or ``index`` or a parameter has the wrong type.
 
@@ -132,22 +176,38 @@ def optical_flow(
     >>> import numpy as np, unsmear
     >>> sequence = unsmear.synthetic.translation(
     ...     unsmear.synthetic.texture((96, 96), seed=1), (1.5, -0.5), shape=(64, 64))
-    >>> r = unsmear.optical_flow(sequence.sharp, method="least-squares")
+    >>> r = unsmear.optical_flow(sequence.sharp)
     >>> np.nanmedian(r.flow, axis=(0, 1)).round(1).tolist()
     [1.5, -0.5]
     """
     values = merged(method, parameters)
-    grey = as_grey_frames(frames, channel_axis, np.float64)
-    least = _LEAST_FRAMES[method]
-    if grey.shape[0] < least or 0 in grey.shape:
-        msg = (
-            f"frames must have shape (T >= {least}, H >= 1, W >= 1) for method "
-            f"{method!r}, got {np.shape(frames)}"
-        )
-        raise ValueError(msg)
-    reference = reference_frame(index, grey.shape[0])
     started = time.perf_counter()
-    flow, confidence = _run(method, grey, reference, values, progress)
+    if method in _COARSE_TO_FINE:
+        flow, confidence, shape, reference = _coarse_to_fine.estimate(
+            frames,
+            channel_axis,
+            lambda count: reference_frame(index, count),
+            mask,
+            values,
+            of_steps(progress),
+            method,
+        )
+    else:
+        if mask is not None:
+            known = ", ".join(repr(name) for name in _COARSE_TO_FINE)
+            msg = f"mask must be None for method {method!r}; it works with {known}"
+            raise ValueError(msg)
+        grey = as_grey_frames(frames, channel_axis, np.float64)
+        least = _LEAST_FRAMES[method]
+        if grey.shape[0] < least or 0 in grey.shape:
+            msg = (
+                f"frames must have shape (T >= {least}, H >= 1, W >= 1) for method "
+                f"{method!r}, got {np.shape(frames)}"
+            )
+            raise ValueError(msg)
+        reference = reference_frame(index, grey.shape[0])
+        flow, confidence = _run(method, grey, reference, values, progress)
+        shape = list(grey.shape)
     valid = np.asarray(~np.isnan(flow).any(axis=-1))
     return FlowResult(
         flow=flow,
@@ -156,7 +216,7 @@ def optical_flow(
         report={
             "method": method,
             "parameters": values,
-            "frames": list(grey.shape),
+            "frames": shape,
             "index": reference,
             "density": float(valid.mean()),
             "seconds": time.perf_counter() - started,
@@ -203,4 +263,4 @@ def _run(
     return _unsmear.fleet_jepson(grey, index, values, progress=steps)
 
 
-assert set(_LEAST_FRAMES) == set(PARAMETERS), "every method has its parameters"
+assert {*_LEAST_FRAMES, *_COARSE_TO_FINE} == set(PARAMETERS), "every method is here"

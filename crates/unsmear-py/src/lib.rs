@@ -4,6 +4,7 @@
 use pyo3::prelude::*;
 
 mod arrays;
+mod coarse_to_fine;
 mod component_velocity;
 mod convolve;
 mod deblur;
@@ -24,6 +25,8 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 /// Private core of `unsmear`; import the package instead.
 #[pymodule]
 mod _unsmear {
+    #[pymodule_export]
+    use crate::coarse_to_fine::coarse_to_fine;
     #[pymodule_export]
     use crate::component_velocity::{component_velocities, gabor_phase_gradient, gabor_planes};
     #[pymodule_export]

@@ -5,12 +5,14 @@
 //! | [`thesis`] | the founding mean of normal velocities, as published |
 //! | [`least_squares`] | phase differences of frame pairs, local least squares, one scale |
 //! | [`fleet_jepson`] | velocity-tuned filters over many frames, local affine least squares |
+//! | [`coarse_to_fine`] | phase differences over a pyramid, edge-preserving smoothness: the default |
 
 use ndarray::Array2;
 
 use crate::flow_field::FlowField;
 
 pub(crate) mod affine;
+pub mod coarse_to_fine;
 pub(crate) mod constraint;
 pub mod fleet_jepson;
 pub mod least_squares;

@@ -1,0 +1,79 @@
+//! The default flow.
+
+use numpy::{PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+use unsmear::flow::coarse_to_fine::{CoarseToFine, Sequence};
+
+use crate::arrays::{flow_to_python, picture_to_python};
+use crate::threads::run;
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Items {
+    pyramid_factor: f64,
+    coarsest_side: f64,
+    finest_level: usize,
+    warps: usize,
+    finest_warps: usize,
+    passes: usize,
+    sweeps: usize,
+    smoothness: f64,
+    edge_sensitivity: f64,
+    strongest_channel: bool,
+    residual_scale: f64,
+    tau: f64,
+    amplitude_fraction: f64,
+    amplitude_floor: f64,
+    median_radius: usize,
+    guide_sigma: f64,
+    frames_each_side: usize,
+    static_evidence: bool,
+    adapt_to_noise: bool,
+    choose_frames: bool,
+}
+
+/// Flow (H, W, 2) and confidence (H, W) of frames (T, H, W) at `index`.
+#[pyfunction]
+#[pyo3(signature = (frames, index, parameters, *, guide=None, mask=None, progress=None))]
+pub(crate) fn coarse_to_fine(
+    py: Python<'_>,
+    frames: PyReadonlyArray3<'_, f64>,
+    index: usize,
+    parameters: Items,
+    guide: Option<PyReadonlyArray3<'_, f64>>,
+    mask: Option<PyReadonlyArray2<'_, bool>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
+    let Items { pyramid_factor, coarsest_side, finest_level, .. } = parameters;
+    let method = CoarseToFine {
+        pyramid_factor,
+        coarsest_side,
+        finest_level,
+        warps: parameters.warps,
+        finest_warps: parameters.finest_warps,
+        passes: parameters.passes,
+        sweeps: parameters.sweeps,
+        smoothness: parameters.smoothness,
+        edge_sensitivity: parameters.edge_sensitivity,
+        strongest_channel: parameters.strongest_channel,
+        residual_scale: parameters.residual_scale,
+        tau: parameters.tau,
+        amplitude_fraction: parameters.amplitude_fraction,
+        amplitude_floor: parameters.amplitude_floor,
+        median_radius: parameters.median_radius,
+        guide_sigma: parameters.guide_sigma,
+        frames_each_side: parameters.frames_each_side,
+        static_evidence: parameters.static_evidence,
+        adapt_to_noise: parameters.adapt_to_noise,
+        choose_frames: parameters.choose_frames,
+    };
+    let sequence = Sequence {
+        frames: frames.as_array(),
+        index,
+        guide: guide.as_ref().map(PyReadonlyArray3::as_array),
+        mask: mask.as_ref().map(PyReadonlyArray2::as_array),
+    };
+    let estimate = run(py, progress, |control| method.estimate(&sequence, control))?;
+    let flow = flow_to_python(py, estimate.flow).into_any().unbind();
+    Ok((flow, picture_to_python(py, estimate.confidence).into_any().unbind()))
+}

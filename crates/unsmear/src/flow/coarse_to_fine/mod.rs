@@ -1,0 +1,190 @@
+//! Coarse-to-fine phase-based flow: the default method.
+//!
+//! From the coarsest level of a pyramid to the finest, the flow found so far is enlarged and refined
+//! by warping ([`refine`]). At every level one bank of four Gabor filters of wavelength 4 px and 1.6
+//! octaves sees what the level adds: half an octave of detail, moving by less than half a wavelength
+//! against what is known already. Phase differences do not change with brightness and contrast.
+//!
+//! ```text
+//! U <- 0;  for each level: U <- enlarge(U) times the ratio of sizes;  U <- refine(U)
+//! ```
+//!
+//! Valid for motions that some level shows as a few pixels, of things not lost at that level: small
+//! things that move far are missed. Frames beyond two assume constant motion.
+//! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
+
+use ndarray::{Array2, Zip};
+
+use crate::control::Control;
+use crate::error::Result;
+use crate::flow::Estimate;
+use crate::flow_field::FlowField;
+use crate::gabor::{GaborBank, GaborParameters};
+use crate::pyramid::{Resampling, level_sizes, resample};
+
+mod arctangent;
+mod boundary;
+mod choice;
+mod contrast;
+mod data_term;
+mod diffusivity;
+mod evidence;
+mod frames;
+mod guide;
+mod known;
+mod noise_rule;
+mod parameters;
+mod phase_constraint;
+mod refine;
+mod rows;
+mod schedule;
+mod still;
+
+pub use frames::Sequence;
+pub use parameters::CoarseToFine;
+
+use choice::{merge, several_hold};
+use contrast::Contrast;
+use evidence::LEAST_EVIDENCE;
+use frames::{FramePyramid, Plan};
+use guide::EdgeRule;
+use noise_rule::adapt;
+use refine::Settings;
+use schedule::{Climb, Summit, enlarge};
+
+/// Confidence of a flow that is known and deserves none.
+const LEAST_CONFIDENCE: f32 = 1e-6;
+/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
+const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
+
+impl CoarseToFine {
+    /// Flow and confidence at the reference frame.
+    ///
+    /// # Errors
+    /// [`Error::Shape`](crate::Error::Shape) below (2, 1, 1) samples or for a guide of another size,
+    /// [`Error::Value`](crate::Error::Value) for a parameter out of range or an index without a next frame,
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn estimate(&self, sequence: &Sequence<'_>, control: &Control) -> Result<Estimate<f32>> {
+        let mut settings = self.settings()?;
+        let (count, height, width) = sequence.check()?;
+        let sizes = level_sizes((height, width), self.pyramid_factor, self.coarsest_side);
+        let contrast = Contrast::measure(sequence.frames);
+        if contrast.is_blank() {
+            let confidence = Array2::zeros((height, width));
+            return Ok(Estimate { flow: FlowField::unknown((height, width)), confidence });
+        }
+        let plan = Plan { sequence, contrast, sizes: &sizes, factor: self.pyramid_factor };
+        let reference = plan.frame(0.0, sequence.index, control)?;
+        let others = self
+            .offsets(sequence.index, count)
+            .into_iter()
+            .map(|(offset, t)| plan.frame(offset, t, control))
+            .collect::<Result<Vec<_>>>()?;
+        let channels = plan.channels(&reference, control)?;
+        if self.adapt_to_noise {
+            let picture = reference.pictures[0].as_slice().unwrap_or_default();
+            adapt(&mut settings, picture, (height, width), control)?;
+        }
+        let warps: Vec<usize> = (0..sizes.len()).map(|level| self.warps_at(level)).collect();
+        let climb = Climb {
+            settings: &settings,
+            sizes: &sizes,
+            warps: &warps,
+            finest: self.finest_level.min(sizes.len() - 1),
+            reference: &reference,
+            channels: &channels,
+        };
+        let others: Vec<&FramePyramid> = others.iter().collect();
+        let summit = if self.choose_frames && others.len() > 1 {
+            choose(&climb, &others, control)?
+        } else {
+            control.expect(climb.steps());
+            climb.run(&others, control)?
+        };
+        descend(summit, (height, width), control)
+    }
+
+    /// Offsets to the other frames, and their indices.
+    fn offsets(&self, index: usize, count: usize) -> Vec<(f32, usize)> {
+        let reach = self.frames_each_side;
+        if reach == 0 {
+            return vec![(1.0, index + 1)];
+        }
+        (index.saturating_sub(reach)..(index + reach + 1).min(count))
+            .filter(|&t| t != index)
+            .map(|t| (t as f32 - index as f32, t))
+            .collect()
+    }
+
+    fn warps_at(&self, level: usize) -> usize {
+        if level == 0 { self.finest_warps } else { self.warps }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        self.check()?;
+        let gabor = GaborParameters {
+            tuning_frequency: 0.25,
+            bandwidth_octaves: 1.6,
+            orientations: 4,
+            support: 2.2,
+        };
+        Ok(Settings {
+            bank: GaborBank::new(&gabor)?,
+            still: self.static_evidence,
+            tau: self.tau,
+            amplitude_fraction: self.amplitude_fraction,
+            amplitude_floor: self.amplitude_floor,
+            residual: self.residual_scale as f32,
+            alpha: self.smoothness as f32,
+            edges: EdgeRule {
+                sensitivity: self.edge_sensitivity,
+                sigma: 0.7,
+                strongest_channel: self.strongest_channel,
+            },
+            passes: self.passes,
+            sweeps: self.sweeps,
+            median_radius: self.median_radius,
+            guide_sigma: self.guide_sigma as f32,
+        })
+    }
+}
+
+/// The flow of all frames where motion is constant over them, else that of the reference and the next.
+fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
+    control.expect(2 * climb.steps());
+    let next: Vec<&FramePyramid> =
+        others.iter().copied().filter(|frame| frame.offset == 1.0).collect();
+    let [smoothness, edges, residual] = FOR_TWO_FRAMES;
+    let mut settings = climb.settings.clone();
+    settings.alpha *= smoothness as f32;
+    settings.edges.sensitivity *= edges;
+    settings.residual *= residual as f32;
+    let of_two = Climb { settings: &settings, ..*climb };
+    let two = of_two.run(&next, control)?;
+    let several = climb.run(others, control)?;
+    let hold = climb.at(climb.finest, &next, control, |level| {
+        let [two, several] = [&two, &several].map(|s| level.mismatch(&s.flow, control));
+        Ok(several_hold(&two?, &several?))
+    })?;
+    let (flow, confidence) =
+        merge(&hold, (two.flow, two.confidence), (several.flow, several.confidence));
+    Ok(Summit { flow, confidence, evidence: several.evidence })
+}
+
+/// The result at the size of the frames: unknown, with confidence 0, where there is no evidence.
+fn descend(summit: Summit, size: (usize, usize), control: &Control) -> Result<Estimate<f32>> {
+    let larger = |plane: &Array2<f32>| resample(plane.view(), size, Resampling::Linear, control);
+    let mut flow = enlarge(&summit.flow, size, control)?;
+    let mut confidence = larger(&summit.confidence)?;
+    let evidence = larger(&summit.evidence)?;
+    Zip::from(&evidence).and(&mut flow.u).and(&mut flow.v).and(&mut confidence).for_each(
+        |&e, u, v, c| {
+            if e >= LEAST_EVIDENCE {
+                *c = c.clamp(LEAST_CONFIDENCE, 1.0);
+            } else {
+                (*u, *v, *c) = (f32::NAN, f32::NAN, 0.0);
+            }
+        },
+    );
+    Ok(Estimate { flow, confidence })
+}

@@ -1,0 +1,214 @@
+//! Phase constraints between a reference frame and a frame warped onto it.
+//!
+//! Filter `j` of the bank, frame at offset `k`, gives at each pixel one constraint on the increment
+//! `d = (du, dv)` px/frame of the flow that the frame was warped with:
+//!
+//! ```text
+//! G.d + D = 0,   G = k (grad phi_0 + grad phi_1)/2   rad/px,   D = arg(conj(R_0) R_1)   rad
+//! grad phi = Im(conj(R) R')/(|R|^2 + e) + k_j,   R' = (R(+1) e^{-i k_j} - R(-1) e^{i k_j})/2
+//! W = w A/(A + r^2) q^2/(1 + t^4),   A = a_0 a_1,   q = 2A/(a_0^2 + a_1^2)
+//! t = max |grad phi - k_j|^2/(tau sigma_k)^2 over the two frames
+//! ```
+//!
+//! with the frame's weight `w` (0 where it cannot be seen), the amplitude floor `r` and the
+//! deviation `sigma_k = 1/sigma` of the filters' spectrum. The demodulated three-point derivative is
+//! exact on the filter's own wave, one-sided at the edge; what it errs elsewhere, the next warp
+//! sees again. A constraint that is not finite, or farther off its frequency than `t = 16`, weighs 0.
+//!
+//! Differs from [`crate::flow::constraint`], the form for one scale without warping, in the shorter
+//! derivative and in `w`. Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), sections 3 and 4.
+
+use multiversion::multiversion;
+
+use super::arctangent::arctangent;
+use crate::array::for_each_row;
+use crate::control::Control;
+use crate::error::Result;
+use crate::gabor::{GaborBank, Responses};
+
+/// Terms of a constraint, one row each: `G_x`, `G_y`, `D`, `W`.
+pub(super) const TERMS: usize = 4;
+/// Added to squared amplitudes, grey levels^2: silence has no phase, and its quotient stays finite.
+const POWER_FLOOR: f32 = 1e-6;
+/// Added to the sum of the squared amplitudes, grey levels^2.
+const SUM_FLOOR: f32 = 1e-9;
+/// Squared deviation of frequency beyond which a constraint is dropped.
+const FARTHEST: f32 = 16.0;
+
+/// What weights depend on, besides the responses.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weighting {
+    /// Squared amplitude floor `r^2`, grey levels^2.
+    pub(super) floor: f32,
+    /// `(tau sigma_k)^-2`, px^2/rad^2.
+    pub(super) narrowness: f32,
+}
+
+/// Complex factors of the samples before and after in a derivative along one axis.
+#[derive(Clone, Copy)]
+struct Stencil {
+    before: [f32; 2],
+    after: [f32; 2],
+}
+
+impl Stencil {
+    /// At position `i` of `n` samples; a neighbour beyond the edge is the sample itself.
+    fn new(k: f64, i: usize, n: usize) -> Self {
+        let (first, last) = (i == 0, i + 1 == n);
+        let scale = if first || last { 1.0 } else { 0.5 };
+        let turn = |angle: f64, by: f64| [by * angle.cos(), by * angle.sin()].map(|f| f as f32);
+        Self {
+            before: turn(if first { 0.0 } else { k }, -scale),
+            after: turn(if last { 0.0 } else { -k }, scale),
+        }
+    }
+}
+
+/// The constants of one filter on one row.
+#[derive(Clone, Copy)]
+struct Filter {
+    tuned: [f32; 2],
+    along_x: Stencil,
+    along_y: Stencil,
+    offset: f32,
+    weighting: Weighting,
+}
+
+/// Rows of one filter's response: above, here and below, real and imaginary.
+type Band<'a> = [(&'a [f32], &'a [f32]); 3];
+
+/// Fills `out` with rows `[G_x, G_y, D, W]` of each filter, (H, N, 4, W).
+///
+/// `visible` (H, W) is `w`, `offset` is `k`.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub(super) fn constrain(
+    bank: &GaborBank<f32>,
+    responses: [&Responses<f32>; 2],
+    visible: &[f32],
+    offset: f32,
+    weighting: Weighting,
+    out: &mut [f32],
+    control: &Control,
+) -> Result<()> {
+    let (filters, height, width) = responses[0].dim();
+    for_each_row(out, filters * TERMS * width, control, |y, out| {
+        let seen = &visible[y * width..(y + 1) * width];
+        for (j, out) in out.chunks_mut(TERMS * width).enumerate() {
+            let [kx, ky] = bank.wavevectors()[j];
+            let bands = responses.map(|r| {
+                [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|row| r.row(j, row))
+            });
+            let mut filter = Filter {
+                tuned: [kx as f32, ky as f32],
+                along_x: Stencil::new(kx, 1, 3),
+                along_y: Stencil::new(ky, y, height),
+                offset,
+                weighting,
+            };
+            let (slopes, rest) = out.split_at_mut(2 * width);
+            let (gx, gy) = slopes.split_at_mut(width);
+            let (step, weight) = rest.split_at_mut(width);
+            if width > 2 {
+                constrain_row(filter, bands[0], bands[1], seen, gx, gy, step, weight);
+            }
+            for x in [0, width - 1] {
+                filter.along_x = Stencil::new(kx, x, width);
+                let at = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
+                let [one, other] = bands.map(|band| Cross::new(&band, at));
+                let terms = constraint(&filter, &one, &other);
+                (gx[x], gy[x], step[x]) = (terms[0], terms[1], terms[2]);
+                weight[x] = terms[3] * seen[x];
+            }
+        }
+    })
+}
+
+/// All samples of a row but the first and the last.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn constrain_row(
+    filter: Filter,
+    one: Band<'_>,
+    other: Band<'_>,
+    seen: &[f32],
+    gx: &mut [f32],
+    gy: &mut [f32],
+    step: &mut [f32],
+    weight: &mut [f32],
+) {
+    let n = seen.len();
+    let (gx, gy, step, weight) = (&mut gx[..n], &mut gy[..n], &mut step[..n], &mut weight[..n]);
+    let [one, other] = [one, other].map(|band| band.map(|(re, im)| (&re[..n], &im[..n])));
+    for x in 1..n - 1 {
+        let at = [x - 1, x, x + 1];
+        let terms = constraint(&filter, &Cross::new(&one, at), &Cross::new(&other, at));
+        gx[x] = terms[0];
+        gy[x] = terms[1];
+        step[x] = terms[2];
+        weight[x] = terms[3] * seen[x];
+    }
+}
+
+/// A response and its four neighbours.
+#[derive(Clone, Copy)]
+struct Cross {
+    here: [f32; 2],
+    across: [[f32; 2]; 2],
+    along: [[f32; 2]; 2],
+}
+
+impl Cross {
+    #[inline(always)]
+    fn new([above, here, below]: &Band<'_>, [left, x, right]: [usize; 3]) -> Self {
+        Self {
+            here: [here.0[x], here.1[x]],
+            across: [[here.0[left], here.1[left]], [here.0[right], here.1[right]]],
+            along: [[above.0[x], above.1[x]], [below.0[x], below.1[x]]],
+        }
+    }
+}
+
+/// Deviation of the phase gradient along one axis from the tuned one, rad/px.
+#[inline(always)]
+fn deviation([re, im]: [f32; 2], [a, b]: [[f32; 2]; 2], s: Stencil, inverse: f32) -> f32 {
+    let slope_re =
+        s.before[0] * a[0] - s.before[1] * a[1] + (s.after[0] * b[0] - s.after[1] * b[1]);
+    let slope_im =
+        s.before[0] * a[1] + s.before[1] * a[0] + (s.after[0] * b[1] + s.after[1] * b[0]);
+    (re * slope_im - im * slope_re) * inverse
+}
+
+/// `[G_x, G_y, D, W]` of one pixel, for a frame that is seen there.
+#[inline(always)]
+fn constraint(filter: &Filter, one: &Cross, other: &Cross) -> [f32; TERMS] {
+    let power = |c: &Cross| c.here[0] * c.here[0] + c.here[1] * c.here[1];
+    let (p, q) = (power(one), power(other));
+    let slopes = |c: &Cross, power: f32| {
+        let inverse = 1.0 / (power + POWER_FLOOR);
+        [
+            deviation(c.here, c.across, filter.along_x, inverse),
+            deviation(c.here, c.along, filter.along_y, inverse),
+        ]
+    };
+    let (a, b) = (slopes(one, p), slopes(other, q));
+    let square = |d: [f32; 2]| d[0] * d[0] + d[1] * d[1];
+    let (e, f) = (square(a), square(b));
+    let off = if e > f { e } else { f } * filter.weighting.narrowness;
+    let ([re, im], [re_1, im_1]) = (one.here, other.here);
+    let step = arctangent(re * im_1 - im * re_1, re * re_1 + im * im_1);
+    let both = (p * q).sqrt();
+    let sum = p + q + SUM_FLOOR;
+    let steady = off * off;
+    let weight = 4.0 * both * both * both
+        / ((both + filter.weighting.floor) * sum * sum * (1.0 + steady * steady));
+    // Not only weightless: what is not finite must not reach the sums.
+    let kept = off < FARTHEST && weight > 0.0;
+    let select = |value: f32| if kept { value } else { 0.0 };
+    [
+        select(filter.offset * (0.5 * (a[0] + b[0]) + filter.tuned[0])),
+        select(filter.offset * (0.5 * (a[1] + b[1]) + filter.tuned[1])),
+        select(step),
+        select(weight),
+    ]
+}

@@ -1,0 +1,72 @@
+//! Rows of several pictures of one size, written together and in parallel.
+//!
+//! As [`crate::array::for_each_row`], for kernels whose results are separate planes. Each plane is
+//! its own slice, so that the compiler knows that writing one does not change another.
+
+use rayon::prelude::*;
+
+use crate::control::Control;
+use crate::error::Result;
+
+/// Rows per task; see [`crate::array`].
+const ROWS_PER_TASK: usize = 8;
+
+/// Runs `row(y, rows)` for every row of `N` packed planes with rows of `widths` samples.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled); the planes are then undefined.
+pub(super) fn for_each_rows<const N: usize>(
+    planes: [&mut [f32]; N],
+    widths: [usize; N],
+    control: &Control,
+    row: impl Fn(usize, [&mut [f32]; N]) + Sync,
+) -> Result<()> {
+    let mut tasks: Vec<[&mut [f32]; N]> = Vec::new();
+    let mut rest = planes;
+    while rest.iter().zip(widths).all(|(plane, width)| width > 0 && !plane.is_empty()) {
+        let mut at = 0;
+        let mut task: [&mut [f32]; N] = [(); N].map(|()| [].as_mut_slice());
+        rest = rest.map(|plane| {
+            let count = (ROWS_PER_TASK * widths[at]).min(plane.len());
+            let (head, tail) = plane.split_at_mut(count);
+            task[at] = head;
+            at += 1;
+            tail
+        });
+        tasks.push(task);
+    }
+    tasks.into_par_iter().enumerate().try_for_each(|(number, mut planes)| {
+        let rows = planes[0].len() / widths[0];
+        for i in 0..rows {
+            control.check()?;
+            let mut at = 0;
+            row(
+                number * ROWS_PER_TASK + i,
+                planes.each_mut().map(|plane| {
+                    at += 1;
+                    let width = widths[at - 1];
+                    &mut plane[i * width..(i + 1) * width]
+                }),
+            );
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_of_every_plane_once() {
+        let (mut one, mut two) = (vec![0.0; 3 * 21], vec![0.0; 5 * 21]);
+        for_each_rows([&mut one, &mut two], [3, 5], &Control::new(), |y, [a, b]| {
+            a.iter_mut().chain(b).for_each(|s| *s += 1.0 + y as f32);
+        })
+        .unwrap();
+        let right = |plane: &[f32], width| {
+            plane.chunks(width).enumerate().all(|(y, row)| row.iter().all(|&s| s == 1.0 + y as f32))
+        };
+        assert!(right(&one, 3) && right(&two, 5));
+    }
+}

@@ -1,0 +1,121 @@
+//! From the coarsest level to the finest: who refines what, how often.
+//!
+//! ```text
+//! U <- 0;  for each level, coarsest first:  U <- enlarge(U);  U <- refine(U)
+//! ```
+//!
+//! `enlarge` interpolates linearly and multiplies the motion by the ratio of sizes. The evidence of
+//! the levels is gathered on the way, confidence measured at the end.
+
+use ndarray::Array2;
+
+use super::evidence::{confidence, gather};
+use super::frames::FramePyramid;
+use super::refine::{Level, Settings};
+use super::still::spring;
+use crate::control::Control;
+use crate::error::Result;
+use crate::flow_field::FlowField;
+use crate::pyramid::{Resampling, resample};
+
+/// Ratio of sizes up to which a level is evidence of motion at a pixel; coarser ones tell of its surroundings.
+const FARTHEST_EVIDENCE: usize = 8;
+
+/// Everything that a climb needs.
+pub(super) struct Climb<'a> {
+    pub(super) settings: &'a Settings,
+    pub(super) sizes: &'a [(usize, usize)],
+    /// Warps at each level that is solved, finest first; their number ends the climb.
+    pub(super) warps: &'a [usize],
+    pub(super) finest: usize,
+    pub(super) reference: &'a FramePyramid,
+    /// Channels of the guide at each level.
+    pub(super) channels: &'a [Vec<Array2<f32>>],
+}
+
+/// The result at the finest level that was solved.
+pub(super) struct Summit {
+    pub(super) flow: FlowField<f32>,
+    pub(super) confidence: Array2<f32>,
+    pub(super) evidence: Array2<f32>,
+}
+
+impl Climb<'_> {
+    /// Number of warps, the unit of progress.
+    pub(super) fn steps(&self) -> usize {
+        self.warps[self.finest..].iter().sum()
+    }
+
+    /// The flow between the reference and `others`.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub(super) fn run(&self, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
+        let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
+        let (mut evidence, mut trust) = (None, None);
+        let mut resting = Vec::new();
+        for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
+            flow = enlarge(&flow, size, control)?;
+            self.at(level, others, control, |prepared| {
+                let start = FlowField { u: flow.u.clone(), v: flow.v.clone() };
+                let mut springs = None;
+                if let Some(rest) = prepared.look_for_rest(control)? {
+                    springs = Some(spring(&rest, prepared.zoom, &resting, control)?);
+                    resting.push((prepared.zoom, rest.rest));
+                }
+                let refined = prepared.refine(start, self.warps[level], springs, control)?;
+                flow = refined.flow;
+                if level == self.finest || self.sizes[0].0 <= FARTHEST_EVIDENCE * size.0 {
+                    evidence = Some(gather(evidence.take(), &refined.trace, control)?);
+                }
+                if level == self.finest {
+                    let coherence = prepared.coherence(&flow, control)?;
+                    trust = Some(confidence(&coherence, &flow, control)?);
+                }
+                Ok(())
+            })?;
+        }
+        let nothing = || Array2::zeros(flow.dim());
+        let (confidence, evidence) =
+            (trust.unwrap_or_else(nothing), evidence.unwrap_or_else(nothing));
+        Ok(Summit { flow, confidence, evidence })
+    }
+
+    /// Prepares a level and hands it to `work`.
+    pub(super) fn at<R>(
+        &self,
+        level: usize,
+        others: &[&FramePyramid],
+        control: &Control,
+        work: impl FnOnce(&Level<'_>) -> Result<R>,
+    ) -> Result<R> {
+        let sigma = self.settings.bank.sigma();
+        let here = self.reference.at(level, sigma, control)?;
+        let others = others
+            .iter()
+            .map(|frame| frame.at(level, sigma, control))
+            .collect::<Result<Vec<_>>>()?;
+        let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
+        work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
+    }
+}
+
+/// The flow at another size, motions with it; of no flow, no motion.
+pub(super) fn enlarge(
+    flow: &FlowField<f32>,
+    size: (usize, usize),
+    control: &Control,
+) -> Result<FlowField<f32>> {
+    let (height, width) = flow.dim();
+    if (height, width) == size {
+        return Ok(flow.clone());
+    }
+    if height * width == 0 {
+        return Ok(FlowField { u: Array2::zeros(size), v: Array2::zeros(size) });
+    }
+    let larger = |component: &Array2<f32>, to: usize, from: usize| -> Result<Array2<f32>> {
+        let resampled = resample(component.view(), size, Resampling::Linear, control)?;
+        Ok(resampled * (to as f32 / from as f32))
+    };
+    Ok(FlowField { u: larger(&flow.u, size.1, width)?, v: larger(&flow.v, size.0, height)? })
+}

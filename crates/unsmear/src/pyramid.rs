@@ -1,0 +1,196 @@
+//! A picture at a falling number of pixels, and the resampling between its sizes.
+//!
+//! Level `l + 1` has `ceil(f h)` rows and `ceil(f w)` columns of level `l`'s `h` and `w`, `f` the
+//! factor, and samples it after a Gaussian that removes what the smaller picture cannot hold:
+//!
+//! ```text
+//! s = 0.9 px for f = 1/2,  else  s = sqrt(1/f^2 - 1)/2 px,    reflected at the edge
+//! small[i] = sum_k w(p - k) smooth[k],   p = (i + 1/2) n/m - 1/2,   n -> m samples
+//! ```
+//!
+//! Areas are centred on areas, so that nothing shifts between levels. `w` is the triangle
+//! `1 - |t|` ([`Resampling::Linear`]) or Keys' cubic with slope -1/2 ([`Resampling::Cubic`]);
+//! positions beyond the edge read the edge sample. Both reproduce straight lines away from the edge.
+//!
+//! Units: those of the samples; px of the respective level. A NaN spreads over the reach of the
+//! filters. Sources: P. J. Burt & E. H. Adelson 1983 (doi 10.1109/TCOM.1983.1095851) for the
+//! pyramid; R. G. Keys 1981 (doi 10.1109/TASSP.1981.1163711) for the cubic.
+
+use ndarray::{Array2, ArrayView2, Axis};
+
+use crate::array::for_each_row;
+use crate::border::Border;
+use crate::control::Control;
+use crate::convolve::{correlate_axis, gaussian_taps};
+use crate::error::Result;
+use crate::real::Real;
+
+/// Where the taps of [`smooth`] end, in deviations: what is cut off weighs less than 1e-4.
+const SUPPORT: f64 = 4.0;
+/// Deviation before halving, px: a little alias against a little blur.
+const HALVING_SIGMA: f64 = 0.9;
+/// Slope of the cubic at distance 1: the one for which straight lines stay straight.
+const CUBIC_SLOPE: f64 = -0.5;
+
+/// Weights between samples; see the [module](self).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Resampling {
+    /// Two samples per axis.
+    Linear,
+    /// Four samples per axis.
+    Cubic,
+}
+
+/// `picture` convolved with a Gaussian of deviation `sigma` px, reflected at the edge.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn smooth<T: Real>(
+    picture: ArrayView2<'_, T>,
+    sigma: f64,
+    control: &Control,
+) -> Result<Array2<T>> {
+    let radius = (SUPPORT * sigma).ceil() as usize;
+    let taps: Vec<T> = gaussian_taps(sigma, radius).into_iter().map(T::of).collect();
+    let volume = picture.insert_axis(Axis(0));
+    let rows = correlate_axis(volume, &taps, 2, Border::Reflect, control)?;
+    let both = correlate_axis(rows.view(), &taps, 1, Border::Reflect, control)?;
+    Ok(both.index_axis_move(Axis(0), 0))
+}
+
+/// `picture` at another size, areas centred on areas; see the [module](self). Not smoothed.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn resample<T: Real>(
+    picture: ArrayView2<'_, T>,
+    (height, width): (usize, usize),
+    kind: Resampling,
+    control: &Control,
+) -> Result<Array2<T>> {
+    let mut out = Array2::zeros((height, width));
+    if picture.is_empty() {
+        return Ok(out);
+    }
+    let picture = picture.as_standard_layout();
+    let source = picture.as_slice().unwrap_or_default();
+    let (rows, columns) = picture.dim();
+    let down = reads(rows, height, kind);
+    let across = reads(columns, width, kind);
+    let target = out.as_slice_mut().unwrap_or_default();
+    for_each_row(target, width, control, |y, out| {
+        let mut line = vec![T::zero(); columns];
+        for &(k, weight) in &down[y] {
+            let row = &source[k * columns..(k + 1) * columns];
+            line.iter_mut().zip(row).for_each(|(sum, &s)| *sum += T::of(weight) * s);
+        }
+        for (out, taps) in out.iter_mut().zip(&across) {
+            *out = taps.iter().fold(T::zero(), |sum, &(k, w)| sum + T::of(w) * line[k]);
+        }
+    })?;
+    Ok(out)
+}
+
+/// The sizes (H, W) of the levels, finest first: as long as the shorter side keeps `least` samples.
+#[must_use]
+pub fn level_sizes((h, w): (usize, usize), factor: f64, least: f64) -> Vec<(usize, usize)> {
+    let mut sizes = vec![(h, w)];
+    let shorter = h.min(w) as f64;
+    while shorter * factor.powi(sizes.len() as i32) >= least {
+        let (h, w) = sizes[sizes.len() - 1];
+        sizes.push(((h as f64 * factor).ceil() as usize, (w as f64 * factor).ceil() as usize));
+    }
+    sizes
+}
+
+/// The picture at each of `sizes`, the first its own, reduced by `factor` from one to the next.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn pyramid<T: Real>(
+    picture: Array2<T>,
+    sizes: &[(usize, usize)],
+    factor: f64,
+    control: &Control,
+) -> Result<Vec<Array2<T>>> {
+    let halving = factor == 0.5;
+    let sigma = if halving { HALVING_SIGMA } else { 0.5 * (factor.powi(-2) - 1.0).sqrt() };
+    let kind = if halving { Resampling::Linear } else { Resampling::Cubic };
+    let mut levels = vec![picture];
+    for &size in sizes.iter().skip(1) {
+        let smoothed = smooth(levels[levels.len() - 1].view(), sigma, control)?;
+        levels.push(resample(smoothed.view(), size, kind, control)?);
+    }
+    Ok(levels)
+}
+
+/// For each of `to` samples, the samples it reads of `from` and their weights.
+fn reads(from: usize, to: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>> {
+    let step = from as f64 / to as f64;
+    (0..to)
+        .map(|i| {
+            let position = (i as f64 + 0.5) * step - 0.5;
+            let first = position.floor();
+            let t = position - first;
+            let weights = match kind {
+                Resampling::Linear => vec![(0, 1.0 - t), (1, t)],
+                Resampling::Cubic => (-1..=2).map(|k| (k, keys(t - f64::from(k)))).collect(),
+            };
+            let at = |k: i32| Border::Replicate.index(first as isize + k as isize, from);
+            let reads = weights.into_iter().filter(|&(_, w)| w != 0.0);
+            reads.filter_map(|(k, w)| at(k).map(|k| (k, w))).collect()
+        })
+        .collect()
+}
+
+/// Keys' cubic at distance `t`.
+fn keys(t: f64) -> f64 {
+    let (a, t) = (CUBIC_SLOPE, t.abs());
+    if t < 1.0 {
+        ((a + 2.0) * t - (a + 3.0)) * t * t + 1.0
+    } else if t < 2.0 {
+        ((a * t - 5.0 * a) * t + 8.0 * a) * t - 4.0 * a
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp((h, w): (usize, usize)) -> Array2<f64> {
+        Array2::from_shape_fn((h, w), |(y, x)| 3.0 + 2.0 * x as f64 - 0.5 * y as f64)
+    }
+
+    /// Pixel `i` of the small picture covers `step` pixels, whose centre is at (i + 1/2) step - 1/2.
+    #[test]
+    fn areas_stay_centred() {
+        let control = Control::new();
+        for kind in [Resampling::Linear, Resampling::Cubic] {
+            for size in [(20, 16), (30, 37), (23, 24), (80, 64)] {
+                let small = resample(ramp((40, 32)).view(), size, kind, &control).unwrap();
+                let (y, x) = (size.0 / 2, size.1 / 3);
+                let at = |i: usize, n: f64, m: usize| (i as f64 + 0.5) * n / m as f64 - 0.5;
+                let expected = 3.0 + 2.0 * at(x, 32.0, size.1) - 0.5 * at(y, 40.0, size.0);
+                assert!((small[(y, x)] - expected).abs() < 1e-12, "{kind:?} {size:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn constant_and_own_size_are_kept() {
+        let control = Control::new();
+        let flat = Array2::from_elem((9, 13), 7.0f64);
+        let levels = pyramid(flat, &level_sizes((9, 13), 0.75, 3.0), 0.75, &control).unwrap();
+        assert!(levels.len() > 3 && levels.iter().flatten().all(|s| (s - 7.0).abs() < 1e-13));
+        let same = resample(ramp((9, 13)).view(), (9, 13), Resampling::Cubic, &control).unwrap();
+        assert_eq!(same, ramp((9, 13)));
+    }
+
+    #[test]
+    fn sizes_end_at_the_least() {
+        assert_eq!(level_sizes((64, 100), 0.5, 16.0), [(64, 100), (32, 50), (16, 25)]);
+        assert_eq!(level_sizes((5, 7), 0.5, 16.0), [(5, 7)]);
+    }
+}

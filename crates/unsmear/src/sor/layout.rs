@@ -1,0 +1,223 @@
+//! Pixels split by colour: the memory order of the red-black solver.
+//!
+//! Row y of parity p = y mod 2 holds its red pixels x = 2 k + p at index k of one half-row and its black pixels
+//! x = 2 k + 1 - p at index k of another. Then the northern and southern neighbours of index k have index k, the western
+//! and eastern ones are next to each other at k - 1, k (where p plus the colour is even) or k, k + 1 (odd), and a
+//! half-sweep is a loop over contiguous samples. Field rows are `[u red, v red, u black, v black]`; coefficient rows
+//! hold the 14 half-rows named below. Each edge is stored once, with its red pixel. One row of zeros above and below
+//! and zeros around each half-row stand for what lies beyond the picture: their diffusivities vanish, so no loop has to
+//! ask.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::SorSystem;
+use crate::control::Control;
+use crate::error::Result;
+
+/// Samples of a vector register of 512 bits, in f32: half-rows start and end at its multiples.
+pub(super) const LANES: usize = 16;
+
+/// Relative determinant at or below which a pixel without neighbours counts as singular: rounding of `a11 a22 - a12^2`.
+const SINGULAR: f32 = 1e-6;
+
+/// First of the 5 half-rows of red pixels in a coefficient row: inverse 11, 12, 22, right-hand sides 1, 2.
+pub(super) const RED: usize = 0;
+/// Half-row of the diffusivities of red pixels towards west.
+pub(super) const WEST: usize = 5;
+/// Towards east.
+pub(super) const EAST: usize = 6;
+/// Towards north.
+pub(super) const NORTH: usize = 7;
+/// Towards south.
+pub(super) const SOUTH: usize = 8;
+/// First of the 5 half-rows of black pixels, as [`RED`].
+pub(super) const BLACK: usize = 9;
+/// Half-rows of a coefficient row.
+const HALF_ROWS: usize = 14;
+
+/// Half-rows of a field row.
+const FIELD_ROWS: usize = 4;
+
+/// Extents in memory of one size of picture.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub(super) height: usize,
+    pub(super) width: usize,
+    /// Samples from one half-row to the next: the pixels, with zeros around.
+    pub(super) stride: usize,
+}
+
+impl Layout {
+    pub(super) fn new(height: usize, width: usize) -> Self {
+        Self { height, width, stride: width.div_ceil(2).next_multiple_of(LANES) + 2 * LANES }
+    }
+
+    /// Samples of a half-row that the loops cover: its pixels, filled up with zeros.
+    pub(super) fn covered(&self) -> usize {
+        self.stride - 2 * LANES
+    }
+
+    /// Samples of a coefficient row.
+    pub(super) fn block(&self) -> usize {
+        HALF_ROWS * self.stride
+    }
+
+    /// Samples of a field row.
+    pub(super) fn rows(&self) -> usize {
+        FIELD_ROWS * self.stride
+    }
+
+    /// Inverts the equations and sorts them and (u, v) by colour.
+    pub(super) fn pack(
+        &self,
+        system: &SorSystem<'_>,
+        u: &[f32],
+        v: &[f32],
+        coefficients: &mut [f32],
+        field: &mut [f32],
+        control: &Control,
+    ) -> Result<()> {
+        let inner = |row: usize| row..row * (self.height + 1);
+        coefficients[inner(self.block())]
+            .par_chunks_exact_mut(self.block())
+            .zip(field[inner(self.rows())].par_chunks_exact_mut(self.rows()))
+            .enumerate()
+            .with_min_len(LANES)
+            .try_for_each_init(
+                || vec![0.0; 7 * self.width + 1],
+                |scratch, (y, (block, rows))| {
+                    control.check()?;
+                    self.pack_row(system, u, v, y, block, rows, scratch);
+                    Ok(())
+                },
+            )
+    }
+
+    fn pack_row(
+        &self,
+        system: &SorSystem<'_>,
+        u: &[f32],
+        v: &[f32],
+        y: usize,
+        block: &mut [f32],
+        rows: &mut [f32],
+        scratch: &mut [f32],
+    ) {
+        let (width, parity) = (self.width, y % 2);
+        let row = |y: usize| y * width..(y + 1) * width;
+        let (edges, scratch) = scratch.split_at_mut(width + 1);
+        edges[1..width].copy_from_slice(&system.gx[row(y)][..width - 1]);
+        (edges[0], edges[width]) = (0.0, 0.0);
+        let (zeros, scratch) = scratch.split_at_mut(width);
+        zeros.fill(0.0);
+        let north = if y > 0 { &system.gy[row(y - 1)] } else { &*zeros };
+        let south = if y + 1 < self.height { &system.gy[row(y)] } else { &*zeros };
+        let (u, v) = (&u[row(y)], &v[row(y)]);
+        let mut outputs = scratch.chunks_exact_mut(width);
+        if let (Some(i11), Some(i12), Some(i22), Some(c1), Some(c2)) =
+            (outputs.next(), outputs.next(), outputs.next(), outputs.next(), outputs.next())
+        {
+            let [a11, a12, a22, b1, b2] =
+                [system.a11, system.a12, system.a22, system.c1, system.c2]
+                    .map(|plane| &plane[row(y)]);
+            let planes = [a11, a12, a22, b1, b2, u, v, north, south, edges];
+            invert_row(planes, i11, i12, i22, c1, c2);
+        }
+        for (i, plane) in scratch.chunks_exact(width).enumerate() {
+            self.split(plane, parity, block, RED + i, BLACK + i);
+        }
+        self.split(u, parity, rows, 0, 2);
+        self.split(v, parity, rows, 1, 3);
+        for (half_row, plane) in
+            [(WEST, &edges[..width]), (EAST, &edges[1..]), (NORTH, north), (SOUTH, south)]
+        {
+            every_second(&plane[parity.min(width)..], self.half_row(block, half_row));
+        }
+    }
+
+    /// The samples of half-row `i`, without the zeros in front.
+    fn half_row<'a>(&self, block: &'a mut [f32], i: usize) -> &'a mut [f32] {
+        &mut block[i * self.stride + LANES..(i + 1) * self.stride]
+    }
+
+    /// Writes the pixels of a row to their half-rows by colour.
+    fn split(&self, plane: &[f32], parity: usize, block: &mut [f32], red: usize, black: usize) {
+        every_second(&plane[parity.min(plane.len())..], self.half_row(block, red));
+        every_second(&plane[(1 - parity).min(plane.len())..], self.half_row(block, black));
+    }
+
+    /// Writes the solution back in the order of the picture.
+    pub(super) fn unpack(&self, field: &[f32], u: &mut [f32], v: &mut [f32]) {
+        let rows = field[self.rows()..].par_chunks_exact(self.rows()).enumerate();
+        u.par_chunks_exact_mut(self.width)
+            .zip(v.par_chunks_exact_mut(self.width))
+            .zip(rows)
+            .with_min_len(LANES)
+            .for_each(|((u, v), (y, row))| {
+                let half = |i: usize| &row[i * self.stride + LANES..(i + 1) * self.stride];
+                let order = if y % 2 == 0 { [0, 2] } else { [2, 0] };
+                interleave(half(order[0]), half(order[1]), u);
+                interleave(half(order[0] + 1), half(order[1] + 1), v);
+            });
+    }
+}
+
+/// Copies samples 0, 2, 4 ... of `source`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn every_second(source: &[f32], out: &mut [f32]) {
+    let (pairs, last) = source.as_chunks::<2>();
+    for (out, pair) in out.iter_mut().zip(pairs) {
+        *out = pair[0];
+    }
+    if let [last] = last {
+        out[pairs.len()] = *last;
+    }
+}
+
+/// The inverse of [`every_second`] on two half-rows.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn interleave(even: &[f32], odd: &[f32], out: &mut [f32]) {
+    let (pairs, last) = out.as_chunks_mut::<2>();
+    for ((pair, even), odd) in pairs.iter_mut().zip(even).zip(odd) {
+        *pair = [*even, *odd];
+    }
+    if let [last] = last {
+        *last = even[pairs.len()];
+    }
+}
+
+/// Inverse of `A + sum of g I` of a row; a singular pixel's equation becomes U = (u, v).
+///
+/// `planes` are a11, a12, a22, c1, c2, u, v, g to the north and south, and the edges from the western border to the
+/// eastern.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn invert_row(
+    planes: [&[f32]; 10],
+    i11: &mut [f32],
+    i12: &mut [f32],
+    i22: &mut [f32],
+    c1: &mut [f32],
+    c2: &mut [f32],
+) {
+    let n = i11.len();
+    let [a11, a12, a22, b1, b2, u, v, north, south, edges] = planes;
+    let (west, east) = (&edges[..n], &edges[1..=n]);
+    let (a11, a12, a22, b1, b2) = (&a11[..n], &a12[..n], &a22[..n], &b1[..n], &b2[..n]);
+    let (u, v, north, south) = (&u[..n], &v[..n], &north[..n], &south[..n]);
+    let (i12, i22, c1, c2) = (&mut i12[..n], &mut i22[..n], &mut c1[..n], &mut c2[..n]);
+    for x in 0..n {
+        let sum = (west[x] + east[x]) + (north[x] + south[x]);
+        let own = a11[x] * a22[x] - a12[x] * a12[x];
+        // Rounding must not make A indefinite, nor a singular pixel regular.
+        let own = if own > SINGULAR * (a11[x] * a22[x]) { own } else { 0.0 };
+        let determinant = own + sum * (a11[x] + a22[x] + sum);
+        let regular = determinant >= f32::MIN_POSITIVE;
+        let scale = 1.0 / if regular { determinant } else { 1.0 };
+        i11[x] = if regular { (a22[x] + sum) * scale } else { 1.0 };
+        i12[x] = if regular { -a12[x] * scale } else { 0.0 };
+        i22[x] = if regular { (a11[x] + sum) * scale } else { 1.0 };
+        c1[x] = if regular { b1[x] } else { u[x] };
+        c2[x] = if regular { b2[x] } else { v[x] };
+    }
+}
