@@ -109,6 +109,25 @@ def test_pictures_of_one_line_have_the_tuned_gradient_across(
             np.testing.assert_allclose(phi, expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_planes_are_the_same_bank_in_either_precision(
+    dtype: type[np.floating], rng: np.random.Generator
+) -> None:
+    picture = rng.normal(size=(21, 26))
+    response, phi_x, phi_y = gradient(picture)
+    (re, im), (plane_x, plane_y, power) = _unsmear.gabor_planes(
+        picture.astype(dtype), BANK
+    )
+    assert re.dtype == plane_x.dtype == dtype
+    # Rounding of 25 x 25 products of order 1, divided by |R| in the gradient.
+    unit = {np.float64: 1e-14, np.float32: 4e-6}[dtype]
+    np.testing.assert_allclose(re + 1j * im, response, rtol=0, atol=unit)
+    np.testing.assert_allclose(power, np.abs(response) ** 2, rtol=0, atol=4 * unit)
+    bound = 10 * unit / np.abs(response)
+    assert (np.abs(plane_x - phi_x) <= bound).all()
+    assert (np.abs(plane_y - phi_y) <= bound).all()
+
+
 def test_frequency_is_in_cycles_outside_and_radians_inside() -> None:
     x = np.arange(64)
     picture = np.cos(2 * np.pi * 0.15 * x)[None].repeat(40, axis=0)

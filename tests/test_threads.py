@@ -207,9 +207,8 @@ INTERRUPTED = """
 """
 
 
-@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to another process")
-@pytest.mark.parametrize("wait", [0.3, 0.8])
-def test_ctrl_c_is_answered_at_once(wait: float) -> None:
+def seconds_to_answer(wait: float) -> float:
+    """Time from SIGINT, ``wait`` seconds into a long call, to KeyboardInterrupt."""
     code = textwrap.dedent(INTERRUPTED.replace("METHOD", "thesis"))
     with subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
@@ -222,14 +221,22 @@ def test_ctrl_c_is_answered_at_once(wait: float) -> None:
             child.send_signal(signal.SIGINT)
             said, *when = child.stdout.readline().split()
             assert said == "interrupted"
-            seconds = (int(when[0]) - sent) / 1e9
             assert child.stdout.readline() == "usable\n"
             assert child.wait(20) == 0
         finally:
             child.kill()
-    # Promised are 0.2 s, on a machine of one's own; a test shares it with others, whose
-    # time slices are no fault of the library. A core that ignores signals needs 10 s.
-    assert seconds < 0.5, f"answered after {seconds:.3f} s"
+    return (int(when[0]) - sent) / 1e9
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to another process")
+def test_ctrl_c_is_answered_at_once() -> None:
+    """In every stage of the call: time filter, transforms, phases."""
+    seconds = sorted(seconds_to_answer(wait) for wait in (0.05, 0.2, 0.4, 0.7, 1.0))
+    # Promised are 0.2 s on a machine of one's own. A test shares it with others, whose
+    # time slices come on top: at times doubled, and now and then much more for one of
+    # five. The whole call takes some seconds.
+    assert seconds[2] < 0.5, seconds
+    assert seconds[4] < 1.5, seconds
 
 
 def test_the_core_is_optimised() -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "fleet_jepson",
     "fspecial_motion",
     "gabor_phase_gradient",
+    "gabor_planes",
     "get_num_threads",
     "least_squares",
     "motion_psf",
@@ -60,6 +61,9 @@ def component_velocities(
 def gabor_phase_gradient(
     picture: _Double, parameters: _Parameters
 ) -> tuple[_Complex, _Double, _Double]: ...
+def gabor_planes(
+    picture: NDArray[Any], parameters: _Parameters
+) -> tuple[NDArray[Any], NDArray[Any]]: ...
 def correlate_separable(
     volume: _Double, taps: Sequence[Sequence[float]], border: str
 ) -> _Double: ...

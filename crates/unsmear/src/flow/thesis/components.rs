@@ -15,6 +15,7 @@
 use multiversion::multiversion;
 use ndarray::Array3;
 
+use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
 
@@ -46,17 +47,28 @@ impl Response {
 
 /// 'Same' convolution of the frames (T, H, W) with `taps` along t. It commutes with the filters in
 /// space, and on real frames it is done once for all of them.
-#[must_use]
-pub fn filter_in_time(frames: &Array3<f64>, taps: &[f64]) -> Array3<f64> {
-    let mut filtered = Array3::zeros(frames.raw_dim());
-    for (t, mut filtered) in filtered.outer_iter_mut().enumerate() {
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn filter_in_time(
+    frames: &Array3<f64>,
+    taps: &[f64],
+    control: &Control,
+) -> Result<Array3<f64>> {
+    let frames = frames.as_standard_layout();
+    let (count, height, width) = frames.dim();
+    let mut filtered = Array3::zeros((count, height, width));
+    let rows = filtered.as_slice_mut().unwrap_or_default();
+    for_each_row(rows, width, control, |row, sums| {
+        let t = row / height;
         for (s, frame) in frames.outer_iter().enumerate() {
             let lag = (t + taps.len() / 2).checked_sub(s);
             let Some(&tap) = lag.and_then(|lag| taps.get(lag)) else { continue };
-            filtered.zip_mut_with(&frame, |sum, sample| *sum += tap * sample);
+            let samples = frame.row(row % height);
+            sums.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += tap * sample);
         }
-    }
-    filtered
+    })?;
+    Ok(filtered)
 }
 
 /// `un` and `vn` in every frame (T, H, W), px/frame; NaN where there is no phase.
@@ -204,7 +216,7 @@ mod tests {
     #[test]
     fn time_filter_is_a_same_convolution() {
         let frames = Array3::from_shape_fn((3, 1, 2), |(t, _, x)| (t + 4 * x) as f64);
-        let filtered = filter_in_time(&frames, &[0.25, 0.5, 0.25]);
+        let filtered = filter_in_time(&frames, &[0.25, 0.5, 0.25], &Control::new()).unwrap();
         assert_eq!(filtered.as_slice().unwrap(), [0.25, 3.25, 1.0, 5.0, 1.25, 4.25]);
     }
 }

@@ -150,7 +150,7 @@ impl ThesisFlow {
         let pruned = PrunedSpectrum::new(height, width);
         let convolver = FftConvolver::new(height, width, [height / 2, width / 2])?;
         // The filter in time commutes with those in space: once here instead of once per filter.
-        let pictures = filter_in_time(&pictures, &bank.temporal_taps(count));
+        let pictures = filter_in_time(&pictures, &bank.temporal_taps(count), control)?;
         let spectra = (0..count)
             .into_par_iter()
             .map_init(FftScratch::default, |scratch, t| {
