@@ -26,6 +26,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use multiversion::multiversion;
 use ndarray::{Array4, ArrayView2};
 
 use crate::array::{for_each_row, for_each_row_with};
@@ -265,17 +266,33 @@ impl<T: Real> GaborBank<T> {
         }
         let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
         let (re, im) = out[plane(pair.filter)].split_at_mut(width);
-        for x in 0..width {
-            re[x] = ac[x] - sb[x];
-            im[x] = sa[x] + bc[x];
-        }
+        difference(ac, sb, re);
+        sum(sa, bc, im);
         if let Some(mirror) = pair.mirror {
             let (re, im) = out[plane(mirror)].split_at_mut(width);
-            for x in 0..width {
-                re[x] = ac[x] + sb[x];
-                im[x] = sa[x] - bc[x];
-            }
+            sum(ac, sb, re);
+            difference(sa, bc, im);
         }
+    }
+}
+
+/// `out = a + b`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn sum<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        out[x] = a[x] + b[x];
+    }
+}
+
+/// `out = a - b`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn difference<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        out[x] = a[x] - b[x];
     }
 }
 

@@ -121,7 +121,7 @@ fn gated_means(gate: GatedMean, values: &[&[f64]], means: &mut [f64]) {
             let row = row(k);
             for i in 0..n {
                 let far = (row[i] - mean[i]).abs() / spread[i] > gate.distance_limit;
-                let dropped = row[i].is_nan() | (far & (spread[i] > gate.std_limit));
+                let dropped = row[i].is_nan() || (far && spread[i] > gate.std_limit);
                 sum[i] += if dropped { 0.0 } else { row[i] };
                 rest[i] += if dropped { 0.0 } else { 1.0 };
             }
