@@ -5,7 +5,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Axis;
 use unsmear::gabor::{GaborBank, GaborParameters};
-use unsmear::phase_gradient::{PhaseGradient, phase_step};
+use unsmear::phase_gradient::PhaseGradient;
+use unsmear::phase_rate::phase_step;
 use unsmear::{Border, Control};
 use unsmear_benches::{moving_texture, pool};
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from unsmear import metrics, plot
+from unsmear import metrics, plot, synthetic
 from unsmear._unsmear import __version__, get_num_threads, set_num_threads
 from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
 from unsmear.deblur import DeblurResult, deblur
+from unsmear.demo_clip import DemoClip, demo_clip
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
@@ -16,12 +17,14 @@ from unsmear.sequences import read_frames, write_frames
 __all__ = [
     "ComponentVelocities",
     "DeblurResult",
+    "DemoClip",
     "FlowFileError",
     "FlowResult",
     "__version__",
     "blur",
     "component_velocities",
     "deblur",
+    "demo_clip",
     "fspecial_motion",
     "get_num_threads",
     "metrics",
@@ -32,6 +35,7 @@ __all__ = [
     "read_frames",
     "read_image",
     "set_num_threads",
+    "synthetic",
     "write_flow",
     "write_frames",
     "write_image",

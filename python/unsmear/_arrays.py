@@ -22,8 +22,12 @@ Floating = TypeVar("Floating", np.float32, np.float64)
 LUMA = (0.299, 0.587, 0.114)
 
 
-def as_picture_array(array: ArrayLike, argument: str) -> NDArray[Any]:
-    """Return ``array`` as a real numeric array, masked samples as NaN."""
+def as_real_array(array: ArrayLike, argument: str) -> tuple[NDArray[Any], float]:
+    """Return ``array`` as real numbers, unscaled, and the value that stands for white.
+
+    Masked samples become NaN, for which integers become floats; the scale is that of
+    the type that came.
+    """
     result = np.asanyarray(array)
     if result.dtype.kind not in "uif":
         msg = (
@@ -31,13 +35,22 @@ def as_picture_array(array: ArrayLike, argument: str) -> NDArray[Any]:
             f"got dtype {result.dtype}"
         )
         raise TypeError(msg)
-    if isinstance(result, np.ma.MaskedArray):
-        if np.ma.is_masked(result):
-            scaled = scale_of(result.dtype)
-            result = result.astype(np.float64) / scaled
-            return np.asarray(result.filled(np.nan))
-        result = result.data
-    return np.asarray(result)
+    scale = scale_of(result.dtype)
+    if not isinstance(result, np.ma.MaskedArray):
+        return np.asarray(result), scale
+    if not np.ma.is_masked(result):
+        return np.asarray(result.data), scale
+    floats = result if result.dtype.kind == "f" else result.astype(np.float64)
+    return np.asarray(np.ma.filled(floats, np.nan)), scale
+
+
+def as_picture_array(array: ArrayLike, argument: str) -> NDArray[Any]:
+    """Return ``array`` as a real numeric array, masked samples as NaN.
+
+    Integers with masked samples become floats and are divided by their type's maximum.
+    """
+    result, scale = as_real_array(array, argument)
+    return result / scale if result.dtype.kind == "f" and scale != 1.0 else result
 
 
 def scale_of(dtype: np.dtype[Any]) -> float:
@@ -48,7 +61,7 @@ def scale_of(dtype: np.dtype[Any]) -> float:
 def as_floating(
     array: ArrayLike, argument: str, dtype: type[Floating]
 ) -> NDArray[Floating]:
-    """Return ``array`` as packed ``dtype``; integers divided by their type's maximum."""
+    """Return ``array`` as packed ``dtype``, integers divided by the type's maximum."""
     picture = as_picture_array(array, argument)
     scale = scale_of(picture.dtype)
     if scale == 1.0:
@@ -57,7 +70,7 @@ def as_floating(
 
 
 def to_dtype_of(result: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
-    """Return ``result`` (scaled as `as_floating` does) in the type and range of ``like``.
+    """Return ``result`` (scaled like `as_floating`) in type and range of ``like``.
 
     Integers are rounded and clipped; a NaN, which an integer cannot say, is refused.
     """
@@ -132,11 +145,9 @@ def luma(colour: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def as_flow(flow: ArrayLike, argument: str = "flow") -> NDArray[np.float32]:
-    """Return a flow field (H, W, 2) as packed float32."""
-    array = as_picture_array(flow, argument)
+    """Return a flow field (H, W, 2) as packed float32, integers unscaled."""
+    array, _ = as_real_array(flow, argument)
     if array.ndim != 3 or array.shape[-1] != 2:
         msg = f"{argument} must have shape (H, W, 2), got {array.shape}"
         raise ValueError(msg)
-    if array.dtype.kind != "f":
-        array = array.astype(np.float32)
     return np.ascontiguousarray(array, dtype=np.float32)

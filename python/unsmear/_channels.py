@@ -68,7 +68,10 @@ class Channels:
             self._like.dtype.kind == "f"
             and self._like.dtype.itemsize <= WIDEST_EXACT_FLOAT
         )
-        self.array = as_floating(planes, "image", np.float32 if exact else np.float64)
+        if exact:
+            self.array = as_floating(planes, "image", np.float32)
+        else:
+            self.array = as_floating(planes, "image", np.float64)
 
     def flow(self, flow: ArrayLike) -> NDArray[Any]:
         """Return ``flow`` checked against the picture, in the picture's precision."""
@@ -86,6 +89,6 @@ class Channels:
         """Return (C, H, W) as a picture of the type, range and axes that came."""
         picture = to_dtype_of(planes, self._like)
         if self._channel_axis is None:
-            return picture[0]
+            return np.ascontiguousarray(picture[0])
         moved = np.moveaxis(picture, 0, -1)
         return np.ascontiguousarray(np.moveaxis(moved, -1, self._channel_axis))

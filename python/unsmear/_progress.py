@@ -22,7 +22,7 @@ _REDRAW = 0.1  # seconds
 
 
 def of_steps(progress: Progress | None) -> Steps | None:
-    """Turn a callback on the share done into one on (steps done, steps expected)."""
+    """Turn a callback on the share done into one on steps done and steps expected."""
     if progress is None:
         return None
 

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from unsmear import _unsmear
 from unsmear._channels import Channels
+from unsmear._progress import of_steps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
+
+    from unsmear._progress import Progress
 
 
 def blur(
@@ -19,7 +20,7 @@ def blur(
     *,
     exposure: float = 1.0,
     channel_axis: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> NDArray[Any]:
     r"""Blur a sharp picture by its motion.
 
@@ -37,7 +38,7 @@ def blur(
     channel_axis : int, optional
         Axis of 1 or 3 colour channels. Default: the picture is grey.
     progress : callable, optional
-        Called now and then as ``progress(done, total)``; what it raises ends the work.
+        Called with the share done in [0, 1]; an exception it raises cancels the call.
 
     Returns
     -------
@@ -72,10 +73,12 @@ def blur(
     >>> import numpy as np, unsmear
     >>> edge = np.repeat([[0.0, 1.0]], 4, axis=0).repeat(4, axis=1)
     >>> flow = np.full((4, 8, 2), (4.0, 0.0))
-    >>> unsmear.blur(edge, flow)[0].round(1)
+    >>> unsmear.blur(edge, flow)[0].round(1) + 0.0
     array([0. , 0. , 0.1, 0.4, 0.6, 0.9, 1. , 1. ])
     """
     channels = Channels(image, channel_axis)
     function = _unsmear.blur_f32 if channels.array.itemsize == 4 else _unsmear.blur_f64
-    blurred = function(channels.array, channels.flow(flow), float(exposure), progress)
+    blurred = function(
+        channels.array, channels.flow(flow), float(exposure), of_steps(progress)
+    )
     return channels.restore(blurred)

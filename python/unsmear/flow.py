@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -117,7 +118,7 @@ def optical_flow(
         Too few frames or too small, ``index`` out of range, samples that are not
         finite, an unknown method or parameter, or a value out of range.
     TypeError
-        ``frames`` are not real numbers, or a parameter has the wrong type.
+        ``frames`` are not real numbers, or ``index`` or a parameter has the wrong type.
 
     References
     ----------
@@ -147,7 +148,7 @@ def optical_flow(
     reference = reference_frame(index, grey.shape[0])
     started = time.perf_counter()
     flow, confidence = _run(method, grey, reference, values, progress)
-    valid = ~np.isnan(flow).any(axis=-1)
+    valid = np.asarray(~np.isnan(flow).any(axis=-1))
     return FlowResult(
         flow=flow,
         confidence=confidence,
@@ -170,10 +171,15 @@ def reference_frame(index: int | None, count: int) -> int:
     """Return the index of the reference frame, counted from the start."""
     if index is None:
         return (count - 1) // 2
-    if not -count <= index < count:
-        msg = f"index must be in {-count}..{count - 1}, got {index}"
+    try:
+        position = operator.index(index)
+    except TypeError:
+        msg = f"index must be an integer, got {type(index).__name__} {index!r}"
+        raise TypeError(msg) from None
+    if not -count <= position < count:
+        msg = f"index must be in {-count}..{count - 1}, got {position}"
         raise ValueError(msg)
-    return index % count
+    return position % count
 
 
 def _run(
@@ -189,7 +195,7 @@ def _run(
             msg = "frames must be finite everywhere for method 'thesis'"
             raise ValueError(msg)
         exact = _unsmear.thesis_flow(grey, values, progress=steps)
-        known = ~np.isnan(exact).any(axis=-1)
+        known = np.asarray(~np.isnan(exact).any(axis=-1))
         # The founding method has no measure of trust: known or not.
         return exact.astype(np.float32), known.astype(np.float32)
     if method == "least-squares":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear._arrays import as_floating, as_flow, as_picture_array, scale_of
+from unsmear._arrays import as_floating, as_flow, as_real_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -30,13 +30,16 @@ _PERCENTILES = (50, 90, 95, 99)
 # Fl of the KITTI benchmark (Menze & Geiger 2015, doi:10.1109/CVPR.2015.7298925): an
 # outlier is off by more than 3 px and by more than 5 % of the true speed.
 _OUTLIER_PIXELS, _OUTLIER_SHARE = 3.0, 0.05
+_SSIM_WINDOW = 11  # px, Wang et al. 2004
 _DENSITIES = (1.0, 0.9, 0.7, 0.5, 0.3)
 
 
 def _map(name: str, flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     estimate, reference = as_flow(flow), as_flow(truth, "truth")
     if estimate.shape != reference.shape:
-        msg = f"truth must have the shape of flow {estimate.shape}, got {reference.shape}"
+        msg = (
+            f"truth must have the shape of flow {estimate.shape}, got {reference.shape}"
+        )
         raise ValueError(msg)
     return _unsmear.error_map(
         name, estimate.astype(np.float64), reference.astype(np.float64)
@@ -171,9 +174,7 @@ def sparsification(
     reference = as_flow(truth, "truth")
     order_by = as_floating(confidence, "confidence", np.float64)
     if order_by.shape != reference.shape[:2]:
-        msg = (
-            f"confidence must have shape {reference.shape[:2]}, got {order_by.shape}"
-        )
+        msg = f"confidence must have shape {reference.shape[:2]}, got {order_by.shape}"
         raise ValueError(msg)
     counts = ~np.isnan(reference).any(axis=-1) & _as_mask(mask, reference.shape[:2])
     aae, epe = angular_error(flow, truth), endpoint_error(flow, truth)
@@ -229,6 +230,12 @@ def ssim(
     errors as `psnr`, with at least 11 x 11 pixels.
     """
     a, b, scale = _pair(image, reference, data_range)
+    if min(a.shape[:2]) < _SSIM_WINDOW:
+        msg = (
+            f"image must have shape (H >= {_SSIM_WINDOW}, W >= {_SSIM_WINDOW}) to hold "
+            f"one window, got {a.shape}"
+        )
+        raise ValueError(msg)
     if a.ndim == 2:
         a, b = a[..., None], b[..., None]
     channels = range(a.shape[2])
@@ -249,7 +256,8 @@ def ssim(
 def _pair(
     image: ArrayLike, reference: ArrayLike, data_range: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    a, b = as_picture_array(image, "image"), as_picture_array(reference, "reference")
+    a, white = as_real_array(image, "image")
+    b, white_of_reference = as_real_array(reference, "reference")
     if a.shape != b.shape or a.ndim not in (2, 3) or a.size == 0:
         msg = (
             "image and reference must have one shape (H, W) or (H, W, C), "
@@ -258,13 +266,14 @@ def _pair(
         raise ValueError(msg)
     if data_range is not None:
         return a.astype(np.float64), b.astype(np.float64), float(data_range)
-    if scale_of(a.dtype) != scale_of(b.dtype):
+    if white != white_of_reference:
+        types = f"{np.asanyarray(image).dtype} and {np.asanyarray(reference).dtype}"
         msg = (
             "image and reference must be of one integer type or both floats unless "
-            f"data_range is given, got {a.dtype} and {b.dtype}"
+            f"data_range is given, got {types}"
         )
         raise ValueError(msg)
-    return a.astype(np.float64), b.astype(np.float64), scale_of(a.dtype)
+    return a.astype(np.float64), b.astype(np.float64), white
 
 
 def _as_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -274,7 +283,7 @@ def _as_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_
     if array.shape != shape:
         msg = f"mask must have shape {shape}, got {array.shape}"
         raise ValueError(msg)
-    return array != 0
+    return np.asarray(array != 0)
 
 
 def _mean(values: NDArray[np.float64]) -> float:

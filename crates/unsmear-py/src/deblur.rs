@@ -1,5 +1,7 @@
 //! Forward blur and its inverses for Python. Pictures come as channels (C, H, W), flow as (H, W, 2).
 
+#![allow(clippy::needless_pass_by_value, reason = "PyO3 extracts arguments by value")]
+
 use ndarray::{ArrayView2, ArrayView3, Axis};
 use numpy::{Element, IntoPyArray, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;

@@ -9,6 +9,7 @@ mod convolve;
 mod deblur;
 mod errors;
 mod flow;
+mod interpolate;
 mod metrics;
 mod parameters;
 mod psf;
@@ -31,6 +32,8 @@ mod _unsmear {
     use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
     #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
+    #[pymodule_export]
+    use crate::interpolate::sample;
     #[pymodule_export]
     use crate::metrics::{error_map, psnr, ssim};
     #[pymodule_export]

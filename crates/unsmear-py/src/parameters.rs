@@ -1,7 +1,8 @@
 //! Parameters of the methods, read from the dictionaries that the Python functions fill in.
 
 use pyo3::prelude::*;
-use unsmear::component_velocity::{ComponentTests, ComponentVelocities, Temporal};
+use unsmear::component_tests::ComponentTests;
+use unsmear::component_velocity::{ComponentVelocities, Temporal};
 use unsmear::flow::fleet_jepson::FleetJepson;
 use unsmear::flow::least_squares::LeastSquares;
 use unsmear::flow::thesis::gated_mean::GatedMean;

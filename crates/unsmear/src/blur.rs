@@ -5,7 +5,7 @@
 //! ```
 //!
 //! v is the flow in px/frame taken as a steady field of velocity, e the exposure as a fraction of the frame interval,
-//! t = 0 its middle. (The content now at p was at X_p(-t) and will be at X_p(t); by symmetry of the exposure the sign
+//! t = 0 its middle. (The content now at p was at `X_p(-t)` and will be at `X_p(t)`; by symmetry of the exposure the sign
 //! does not matter.) x is interpolated by the cubic spline of `local_spline.rs`, continued by its edge pixels, and the
 //! integral is Simpson's rule with at least two intervals per px of blur, whose relative error at w rad/px along the
 //! path is `(w/2)^4 / 180`: 0.04 % at w = 1. Pixels without motion, or of unknown (NaN) motion, are copied.
@@ -21,7 +21,7 @@ use crate::array::{for_each_row, require_same};
 use crate::control::Control;
 use crate::error::{Error, Result, require};
 use crate::flow_field::FlowView;
-use crate::local_spline::{LocalSpline, Position};
+use crate::local_spline::{LocalSpline, Path};
 use crate::psf::LONGEST_MOTION;
 use crate::real::Real;
 use crate::streamline::Streamlines;
@@ -72,6 +72,7 @@ fn blur_row<T: Real>(
     y: usize,
     row: &mut [T],
 ) {
+    let (mut path, mut weights) = (Path::new(0), Vec::new());
     for (x, sample) in row.iter_mut().enumerate() {
         let motion = lines.motion(y, x);
         let speed = (motion[0] * motion[0] + motion[1] * motion[1]).sqrt();
@@ -81,25 +82,24 @@ fn blur_row<T: Real>(
         }
         // Strides of at most a pixel on either side of the middle, each of two intervals.
         let strides = (0.5 * length).ceil() as usize;
-        let steps = 2 * strides;
         let time = T::of(0.5 * exposure / strides as f64);
-        let (mut odd, mut even, mut ends) = (T::zero(), *sample, T::zero());
-        for direction in [-T::one(), T::one()] {
-            let mut walker = lines.start(y, x, motion, speed);
-            for k in 1..=strides {
-                lines.stride(&mut walker, direction * time);
-                let ([hx, hy], [dx, dy]) = (walker.halfway, walker.offset);
-                odd += spline.near(y, x, &Position::new(hy, hx));
-                let value = spline.near(y, x, &Position::new(dy, dx));
-                if k == strides {
-                    ends += value;
-                } else {
-                    even += value;
-                }
+        path.clear();
+        let mut ahead = lines.start(y, x, motion, speed);
+        let mut behind = ahead;
+        for _ in 0..strides {
+            lines.stride(&mut ahead, time);
+            lines.stride(&mut behind, -time);
+            for point in [ahead.halfway, behind.halfway, ahead.offset, behind.offset] {
+                path.push(point);
             }
         }
-        let weight = T::of(1.0 / (6 * steps) as f64);
-        *sample = weight * (ends + T::of(4.0) * odd + T::of(2.0) * even);
+        path.prepare();
+        // Simpson's weights 2 | 4, 2, 4, 2 ... 4, 1 from the middle to either end, over their sum.
+        let unit = T::of(1.0 / (12 * strides) as f64);
+        weights.clear();
+        weights.extend((0..strides).flat_map(|_| [T::of(4.0) * unit, T::of(2.0) * unit]));
+        weights[2 * strides - 1] = unit;
+        *sample = T::of(2.0) * unit * *sample + spline.weighted_sum(y, x, &path, &weights);
     }
 }
 

@@ -169,55 +169,6 @@ fn weighted_sum<T: Real>(rows: &[&[T]], weights: &[T], out: &mut [T]) {
     }
 }
 
-/// Sums of an even and an odd filter that share their loads: with `e = rows[r+j] + rows[r-j]` and
-/// `o = rows[r+j] - rows[r-j]`,
-/// `even[x] = w_e[0] rows[r] + sum_j w_e[j] e`, `odd[x] = sum_j w_o[j] o`, `j = 1..=r`.
-///
-/// `even_taps` holds `w_e[0..=r]`, `odd_taps` holds `w_o[0..=r]` with `w_o[0]` unused.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn even_odd_sums<T: Real>(
-    rows: &[&[T]],
-    even_taps: &[T],
-    odd_taps: &[T],
-    even: &mut [T],
-    odd: &mut [T],
-) {
-    const HALF: usize = LANES / 2;
-    let radius = even_taps.len() - 1;
-    for start in (0..even.len()).step_by(HALF) {
-        let end = (start + HALF).min(even.len());
-        let (even, odd) = (&mut even[start..end], &mut odd[start..end]);
-        let mut even_sum = [T::zero(); HALF];
-        let mut odd_sum = [T::zero(); HALF];
-        if even.len() == HALF {
-            let centre = &rows[radius][start..end];
-            for i in 0..HALF {
-                even_sum[i] = even_taps[0] * centre[i];
-            }
-            for j in 1..=radius {
-                let (a, b) = (&rows[radius + j][start..end], &rows[radius - j][start..end]);
-                for i in 0..HALF {
-                    even_sum[i] += even_taps[j] * (a[i] + b[i]);
-                    odd_sum[i] += odd_taps[j] * (a[i] - b[i]);
-                }
-            }
-            even.copy_from_slice(&even_sum);
-            odd.copy_from_slice(&odd_sum);
-        } else {
-            for i in 0..even.len() {
-                even_sum[i] = even_taps[0] * rows[radius][start + i];
-                for j in 1..=radius {
-                    let (a, b) = (rows[radius + j][start + i], rows[radius - j][start + i]);
-                    even_sum[i] += even_taps[j] * (a + b);
-                    odd_sum[i] += odd_taps[j] * (a - b);
-                }
-                even[i] = even_sum[i];
-                odd[i] = odd_sum[i];
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -259,27 +210,6 @@ mod tests {
                 let want = direct(&v, &taps, axis, border);
                 let worst = (&got - &want).mapv(f64::abs).fold(0.0, |a: f64, &b| a.max(b));
                 prop_assert_eq!(worst, 0.0);
-            }
-        }
-
-        #[test]
-        fn even_and_odd_sums_are_two_filters(n in 1usize..100, radius in 0usize..7) {
-            let v = wavy([1, 1, n + 2 * radius]);
-            let line = v.as_slice().unwrap();
-            let rows: Vec<&[f64]> = (0..=2 * radius).map(|j| &line[j..j + n]).collect();
-            let taps_e: Vec<f64> = (0..=radius).map(|j| 1.0 / (j + 1) as f64).collect();
-            let taps_o: Vec<f64> = (0..=radius).map(|j| j as f64).collect();
-            let (mut even, mut odd) = (vec![9.0; n], vec![9.0; n]);
-            even_odd_sums(&rows, &taps_e, &taps_o, &mut even, &mut odd);
-            for i in 0..n {
-                let (mut e, mut o) = (0.0, 0.0);
-                for j in 0..=2 * radius {
-                    let d = j as isize - radius as isize;
-                    e += taps_e[d.unsigned_abs()] * line[i + j];
-                    o += taps_o[d.unsigned_abs()] * d.signum() as f64 * line[i + j];
-                }
-                // Another order of at most 13 additions of values below 10.
-                prop_assert!((even[i] - e).abs() < 1e-12 && (odd[i] - o).abs() < 1e-12);
             }
         }
     }

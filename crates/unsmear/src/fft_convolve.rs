@@ -6,7 +6,7 @@
 //! f(y, x) = sum_{j, i} g(j, i) I(y - j, x - i),   0 <= y < 2H - 1,  0 <= x < 2W - 1
 //! ```
 //!
-//! with zeros outside both (an explicit [`Border::Zero`](crate::Border::Zero)); kept are the (H, W)
+//! with zeros outside both (an explicit [`Border::Zero`]); kept are the (H, W)
 //! samples from `crop` on. A padded size of (2H, 2W) holds it without wrap-around. Transforms run
 //! axis by axis, so that empty rows are never transformed and unused ones never computed.
 //!

@@ -1,11 +1,28 @@
 //! Phase-based optical flow and pixel-by-pixel removal of motion blur.
 //!
-//! The modules in pipeline order; each uses only those above it.
+//! The modules in pipeline order; each uses only modules of lower rank.
 //!
-//! | module | concept |
-//! |---|---|
-//! | [`error`], [`real`], [`border`], [`control`] | failures, scalars, picture edges, cancellation |
-//! | [`flow_field`] | a field of motion |
+//! | rank | modules | concept |
+//! |---|---|---|
+//! | 0 | [`error`], [`real`] | failures; `f32` and `f64` |
+//! | 1 | [`border`], [`control`], [`flow_field`] | picture edges; cancellation; a field of motion |
+//! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
+//! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
+//! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
+//! | 5 | [`gabor`] | filters tuned to a wavevector, complex responses |
+//! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
+//! | 7 | [`phase_gradient`] | phase in space |
+//! | 8 | [`component_velocity`] | what one filter sees of the motion |
+//! | 8 | [`flow`], [`flow::thesis::bank`] | an estimate of flow, with confidence; the founding filters |
+//! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
+//! | 9 | [`flow::thesis::components`], [`flow::thesis::gated_mean`], [`flow::thesis::pruned`] | parts of the founding method |
+//! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
+//! | 11 | [`psf`], `streamline`, `local_spline`, `spline_filter`, [`noise`] | kernels and paths of motion; sampling; noise |
+//! | 12 | [`interpolate`], [`blur`] | pictures between pixels, warping; the forward operator |
+//! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
+//! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
+//! | 15 | [`deblur`] | their names |
+//! | 16 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
@@ -14,23 +31,29 @@
 mod array;
 pub mod blur;
 pub mod border;
+pub mod component_tests;
 pub mod component_velocity;
 pub mod control;
 pub mod convolve;
 pub mod deblur;
+mod demodulation;
 pub mod error;
+mod even_odd;
 pub mod fft_convolve;
 pub mod flow;
 pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
+pub mod interpolate;
 mod local_spline;
 pub mod metrics;
 pub mod noise;
 pub mod phase_gradient;
+pub mod phase_rate;
 pub mod psf;
 pub mod real;
 pub mod spatiotemporal;
+mod spline_filter;
 mod streamline;
 
 pub use border::Border;
@@ -38,4 +61,5 @@ pub use control::Control;
 pub use convolve::{correlate_axis, correlate_separable, gaussian_taps};
 pub use error::{Error, Result};
 pub use flow_field::{FlowField, FlowView};
+pub use interpolate::{SplineDegree, SplineImage};
 pub use real::Real;

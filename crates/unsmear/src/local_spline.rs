@@ -71,41 +71,93 @@ impl<T: Real> LocalSpline<T> {
         Ok(Self { coefficients, stride })
     }
 
-    /// Value `dy`, `dx` (px) from the pixel (y, x); the sum must lie within the picture.
+    /// Sum over the points of `path` of their values times `weights`, one weight for each pair of points.
     #[inline(always)]
-    pub(crate) fn near(&self, y: usize, x: usize, at: &Position<T>) -> T {
-        let top = (y as isize + at.row) as usize * self.stride + (x as isize + at.column) as usize;
+    pub(crate) fn weighted_sum(&self, y: usize, x: usize, path: &Path<T>, weights: &[T]) -> T {
+        // Four columns kept apart fill a vector register; they are added at the end.
         let mut columns = [T::zero(); 4];
-        for (i, wy) in at.down.into_iter().enumerate() {
-            let row = &self.coefficients[top + i * self.stride..][..4];
-            for (sum, &c) in columns.iter_mut().zip(row) {
-                *sum += wy * c;
+        let first = (y * self.stride + x) as isize;
+        let [wa, wb, wc, wd] = path.down.weights.each_ref();
+        let [va, vb, vc, vd] = path.across.weights.each_ref();
+        for (i, &weight) in weights.iter().flat_map(|w| [w, w]).enumerate() {
+            let (row, column) = (path.down.whole[i], path.across.whole[i]);
+            let top = (first + row as isize * self.stride as isize + column as isize) as usize;
+            let patch = &self.coefficients[top..top + 3 * self.stride + 4];
+            let (a, b) = (&patch[..4], &patch[self.stride..self.stride + 4]);
+            let (c, d) = (&patch[2 * self.stride..2 * self.stride + 4], &patch[3 * self.stride..]);
+            let across = [va[i], vb[i], vc[i], vd[i]];
+            for j in 0..4 {
+                let value = (wa[i] * a[j] + wb[i] * b[j]) + (wc[i] * c[j] + wd[i] * d[j]);
+                columns[j] += weight * across[j] * value;
             }
         }
-        let [a, b, c, d] = columns;
-        let [wa, wb, wc, wd] = at.across;
-        (a * wa + b * wb) + (c * wc + d * wd)
+        (columns[0] + columns[1]) + (columns[2] + columns[3])
     }
 }
 
-/// Where four by four coefficients start, relative to a pixel, and their weights; shared by the channels.
-pub(crate) struct Position<T> {
-    row: isize,
-    column: isize,
-    down: [T; 4],
-    across: [T; 4],
+/// Points near a pixel, prepared for all channels at once: offsets first, then [`Path::prepare`].
+pub(crate) struct Path<T> {
+    down: Axis<T>,
+    across: Axis<T>,
 }
 
-impl<T: Real> Position<T> {
+/// One coordinate of the points of a path.
+struct Axis<T> {
+    offsets: Vec<T>,
+    /// First coefficient under the spline, relative to the pixel's own place among the padded ones.
+    whole: Vec<i32>,
+    weights: [Vec<T>; 4],
+}
+
+impl<T: Real> Path<T> {
+    /// Room for `points` points.
+    pub(crate) fn new(points: usize) -> Self {
+        let axis = || Axis {
+            offsets: Vec::with_capacity(points),
+            whole: vec![0; points],
+            weights: [(); 4].map(|()| vec![T::zero(); points]),
+        };
+        Self { down: axis(), across: axis() }
+    }
+
+    /// Forgets the points.
     #[inline(always)]
-    pub(crate) fn new(dy: T, dx: T) -> Self {
-        let (fy, fx) = (dy.floor(), dx.floor());
-        Self {
-            // The coefficient before the cell, in padded rows: -1 + PAD.
-            row: fy.as_f64() as isize + PAD as isize - 1,
-            column: fx.as_f64() as isize + PAD as isize - 1,
-            down: spline_weights(dy - fy),
-            across: spline_weights(dx - fx),
+    pub(crate) fn clear(&mut self) {
+        self.down.offsets.clear();
+        self.across.offsets.clear();
+    }
+
+    /// Adds the point at `dx`, `dy` px from the pixel; it must lie within the picture.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, [dx, dy]: [T; 2]) {
+        self.down.offsets.push(dy);
+        self.across.offsets.push(dx);
+    }
+
+    /// Computes places and weights of the points.
+    #[inline(always)]
+    pub(crate) fn prepare(&mut self) {
+        self.down.prepare();
+        self.across.prepare();
+    }
+}
+
+impl<T: Real> Axis<T> {
+    #[inline(always)]
+    fn prepare(&mut self) {
+        let n = self.offsets.len();
+        if self.whole.len() < n {
+            self.whole.resize(n, 0);
+            self.weights.iter_mut().for_each(|w| w.resize(n, T::zero()));
+        }
+        let (offsets, whole) = (&self.offsets[..n], &mut self.whole[..n]);
+        let [a, b, c, d] = &mut self.weights;
+        let (a, b, c, d) = (&mut a[..n], &mut b[..n], &mut c[..n], &mut d[..n]);
+        for i in 0..n {
+            let floor = offsets[i].floor();
+            // The coefficient before the cell: -1, and the padding.
+            whole[i] = floor.as_i32() + (PAD as i32 - 1);
+            [a[i], b[i], c[i], d[i]] = spline_weights(offsets[i] - floor);
         }
     }
 }
@@ -144,18 +196,26 @@ mod tests {
     use super::*;
     use ndarray::Array2;
 
+    fn value<T: Real>(spline: &LocalSpline<T>, y: usize, x: usize, offset: [f64; 2]) -> T {
+        let mut path = Path::new(1);
+        // One weight stands for two points.
+        path.push(offset.map(T::of));
+        path.push(offset.map(T::of));
+        path.prepare();
+        T::of(0.5) * spline.weighted_sum(y, x, &path, &[T::one()])
+    }
+
     #[test]
     fn passes_through_the_samples_and_reproduces_planes() {
         let image = Array2::from_shape_fn((31, 40), |(y, x)| ((y * 7 + x * x) % 23) as f64);
         let spline = LocalSpline::new(&image.view(), &Control::new()).unwrap();
-        let origin = Position::new(0.0, 0.0);
         for ((y, x), &sample) in image.indexed_iter() {
             // Both prefilters are cut at |z|^12 = 1.4e-7 of a contrast of 23.
-            assert!((spline.near(y, x, &origin) - sample).abs() < 1e-4);
+            assert!((value(&spline, y, x, [0.0, 0.0]) - sample).abs() < 1e-4);
         }
         let plane = Array2::from_shape_fn((40, 40), |(y, x)| 2.0 * y as f64 - 0.5 * x as f64);
         let spline = LocalSpline::new(&plane.view(), &Control::new()).unwrap();
-        let value = spline.near(20, 20, &Position::new(-1.3, 0.7));
+        let value = value(&spline, 20, 20, [0.7, -1.3]);
         assert!((value - (2.0 * 18.7 - 0.5 * 20.7)).abs() < 1e-4);
     }
 
@@ -165,10 +225,9 @@ mod tests {
         let clean = LocalSpline::new(&image.view(), &Control::new()).unwrap();
         image[(25, 25)] = f32::NAN;
         let holed = LocalSpline::new(&image.view(), &Control::new()).unwrap();
-        let at = Position::new(0.4, 0.6);
         for (y, x) in (0..49usize).flat_map(|y| (0..49usize).map(move |x| (y, x))) {
             let near = y.abs_diff(25) <= VALUE_REACH && x.abs_diff(25) <= VALUE_REACH;
-            let (a, b): (f32, f32) = (clean.near(y, x, &at), holed.near(y, x, &at));
+            let (a, b) = (value(&clean, y, x, [0.6, 0.4]), value(&holed, y, x, [0.6, 0.4]));
             assert!(b.to_bits() == a.to_bits() || (near && b.is_nan()), "{y} {x}");
         }
     }

@@ -75,7 +75,7 @@ pub fn estimate_noise<T: Real>(
         .map(|&[top, left]| {
             control.check()?;
             let part = s![top..top + TILE, left..left + TILE];
-            let motion = [mean_known(flow.u.slice(part)), mean_known(flow.v.slice(part))];
+            let motion = [mean_known(&flow.u.slice(part)), mean_known(&flow.v.slice(part))];
             let motion = motion.map(|component| component * exposure);
             Ok(noise_power(&image.slice(part), motion, &plan))
         })
@@ -90,7 +90,7 @@ pub fn estimate_noise<T: Real>(
 }
 
 /// Mean of the known samples; 0 when there are none.
-fn mean_known<T: Real>(samples: ArrayView2<'_, T>) -> f64 {
+fn mean_known<T: Real>(samples: &ArrayView2<'_, T>) -> f64 {
     let known = || samples.iter().map(|s| s.as_f64()).filter(|s| s.is_finite());
     known().sum::<f64>() / known().count().max(1) as f64
 }

@@ -19,7 +19,7 @@
 //! documentation states it, with the end treatment the founding method relied on (lengths below 1 count as 1, angle
 //! modulo 180 degrees, counter-clockwise with y up). It is not exact: weights are distances, not times.
 //!
-//! References: C. Texin, "Optical Flow Using Phase Information for Deblurring", MIT MEng thesis, 2007, chapter 4;
+//! References: C. Texin, "Optical Flow Using Phase Information for Deblurring", M.Eng. thesis, MIT, 2007, chapter 4;
 //! P. C. Hansen, J. G. Nagy, D. P. O'Leary, "Deblurring Images", SIAM 2006,
 //! [10.1137/1.9780898718874](https://doi.org/10.1137/1.9780898718874), section 3.2.
 

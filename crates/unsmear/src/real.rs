@@ -16,6 +16,9 @@ pub trait Real: NdFloat + Default + sealed::Sealed {
     fn of(value: f64) -> Self;
     /// This value as `f64`, exactly.
     fn as_f64(self) -> f64;
+    /// Rounded towards 0 to an index or offset; beyond the range of `i32`, its nearest end; 0 for NaN. A single
+    /// conversion, unlike the way through `f64`.
+    fn as_i32(self) -> i32;
     /// Angle of `re + i im`, rad in [-pi, pi], NaN for NaN, 0 for 0; `im = 0, re > 0` gives exactly
     /// 0. In `f32` a polynomial that the compiler vectorises, off by at most 4e-7 rad; in `f64` the
     /// system's own.
@@ -41,6 +44,9 @@ impl Real for f32 {
     }
     fn as_f64(self) -> f64 {
         f64::from(self)
+    }
+    fn as_i32(self) -> i32 {
+        self as i32
     }
     #[inline(always)]
     fn angle(im: Self, re: Self) -> Self {
@@ -68,6 +74,9 @@ impl Real for f64 {
     }
     fn as_f64(self) -> f64 {
         self
+    }
+    fn as_i32(self) -> i32 {
+        self as i32
     }
     fn angle(im: Self, re: Self) -> Self {
         im.atan2(re)

@@ -30,8 +30,9 @@ use ndarray::{Array2, ArrayView3};
 use crate::array::require_frames;
 use crate::border::Border;
 use crate::control::Control;
-use crate::convolve::{even_odd_sums, gaussian_taps};
+use crate::convolve::gaussian_taps;
 use crate::error::{Error, Result};
+use crate::even_odd::even_odd_sums;
 use crate::gabor::{GaborBank, GaborParameters, Responses};
 use crate::real::Real;
 
@@ -218,7 +219,7 @@ fn carried<T: Real>(p: &Responses<T>, q: &Responses<T>, sign: T) -> Responses<T>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phase_gradient::{rate_of_phase, square};
+    use crate::phase_rate::{rate_of_phase, square};
     use ndarray::Array3;
 
     fn drifting_wave(k: [f64; 2], omega: f64) -> Array3<f64> {

@@ -101,8 +101,8 @@ impl<T: Real> Streamlines<T> {
     fn interpolate(&self, origin: [usize; 2], offset: [T; 2]) -> [T; 2] {
         let whole = [offset[0].floor(), offset[1].floor()];
         let (fx, fy) = (offset[0] - whole[0], offset[1] - whole[1]);
-        let x = (origin[0] as isize + whole[0].as_f64() as isize) as usize;
-        let y = (origin[1] as isize + whole[1].as_f64() as isize) as usize;
+        let x = (origin[0] as isize + whole[0].as_i32() as isize) as usize;
+        let y = (origin[1] as isize + whole[1].as_i32() as isize) as usize;
         let top = &self.field[y * self.stride + x..][..2];
         let bottom = &self.field[(y + 1) * self.stride + x..][..2];
         let ([a, b], [c, d]) = ([top[0], top[1]], [bottom[0], bottom[1]]);

@@ -37,7 +37,9 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--method", choices=METHODS, default="wiener", help="default wiener"
     )
-    verb.add_argument("--noise", type=float, help="standard deviation; default measured")
+    verb.add_argument(
+        "--noise", type=float, help="standard deviation; default measured"
+    )
     verb.add_argument("--flow", help="flow file to use for all frames, not measured")
     _common.add_flow_method(verb, "--flow-method", "least-squares")
 

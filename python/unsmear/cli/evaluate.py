@@ -44,7 +44,10 @@ def run(options: argparse.Namespace) -> None:
             msg = "give FLOW TRUTH or --images A B, not both"
             raise ValueError(msg)
         a, b = map(read_image, options.images)
-        result = {"psnr": metrics.psnr(a, b), "ssim": metrics.ssim(a, b)}
+        result: dict[str, Any] = {
+            "psnr": metrics.psnr(a, b),
+            "ssim": metrics.ssim(a, b),
+        }
         _common.show_result(result, as_json=options.json)
         return
     if len(options.files) != 2:

@@ -18,7 +18,7 @@
 //! odd length H is a plain box blur again); the flipped inverse's peak lies one sample before the node, which shifts
 //! the picture by 1/m px; the constant gain is 1/(1 + r), not 1; lengths are rounded. Cost: about (m |v|)^2 per pixel.
 //!
-//! Source: C. Texin, "Optical Flow Using Phase Information for Deblurring", MIT MEng thesis, 2007, section 4.2.
+//! Source: C. Texin, "Optical Flow Using Phase Information for Deblurring", M.Eng. thesis, MIT, 2007, section 4.2.
 
 use std::collections::HashMap;
 
@@ -126,7 +126,9 @@ impl Inverse {
         let (p, q) = psf.dim();
         let mut spectrum: Vec<Complex64> = psf.iter().map(|&w| w.into()).collect();
         plan.forward(&mut spectrum, scratch);
-        spectrum.iter_mut().for_each(|k| *k = k.conj() / (k.norm_sqr() + r));
+        for k in &mut spectrum {
+            *k = k.conj() / (k.norm_sqr() + r);
+        }
         plan.inverse(&mut spectrum, scratch);
         let flipped = Array2::from_shape_fn((p, q), |(i, j)| spectrum[p * q - 1 - i * q - j].re);
         Some(Self { flipped, node: [p.div_ceil(2) - 1, q.div_ceil(2) - 1] })

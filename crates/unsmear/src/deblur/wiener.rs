@@ -16,6 +16,10 @@
 //! Validity: steady motion during the exposure; noise white. Pixels whose blur is below 1/2 px, longer than
 //! [`LONGEST_BLUR`], or unknown (NaN) are copied bit for bit. Beyond the picture its edge pixels continue. An unknown
 //! pixel makes unknown all that its streamlines reach, and nothing else changes.
+#![allow(
+    clippy::inline_always,
+    reason = "a helper gets its caller's vector instructions only when inlined"
+)]
 
 use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2};
@@ -26,7 +30,7 @@ use crate::array::{for_each_row, require_same};
 use crate::control::Control;
 use crate::error::{Error, Result, require};
 use crate::flow_field::FlowView;
-use crate::local_spline::{LocalSpline, Position, VALUE_REACH};
+use crate::local_spline::{LocalSpline, Path, VALUE_REACH};
 use crate::noise::estimate_noise;
 use crate::real::Real;
 use crate::streamline::Streamlines;
@@ -93,7 +97,9 @@ impl WienerDeblur {
         let channels = images.len();
         let mut out: Vec<T> = Vec::with_capacity(height * width * channels);
         for y in 0..height {
-            images.iter().for_each(|image| out.extend(image.row(y)));
+            for image in images {
+                out.extend(image.row(y));
+            }
         }
         control.expect(height);
         for_each_row(&mut out, width * channels, control, |y, rows| {
@@ -202,30 +208,46 @@ fn restore_row<T: Real>(
     rows: &mut [T],
 ) {
     let width = rows.len() / splines.len();
+    let mut path = Path::new(2 * bank.reach());
     for x in 0..width {
         let motion = lines.motion(y, x);
         let level = levels[x];
         let known = if level == UNKNOWN_LEVEL { 0 } else { level };
         let Some(kernel) = bank.kernel(method.blur_length(motion), known) else { continue };
         let speed = (motion[0] * motion[0] + motion[1] * motion[1]).sqrt();
-        let time = T::of(2.0) / speed;
-        for channel in 0..splines.len() {
+        walk(lines, [y, x], motion, speed, kernel.len() - 1, &mut path);
+        for (channel, spline) in splines.iter().enumerate() {
             let sample = &mut rows[channel * width + x];
-            *sample = if level == UNKNOWN_LEVEL { T::nan() } else { *sample * kernel[0] };
-        }
-        let mut ahead = lines.start(y, x, motion, speed);
-        let mut behind = ahead;
-        for taps in kernel[1..].chunks_exact(2) {
-            lines.stride(&mut ahead, time);
-            lines.stride(&mut behind, -time);
-            let pairs = [(ahead.halfway, behind.halfway), (ahead.offset, behind.offset)];
-            for (&tap, ([ax, ay], [bx, by])) in taps.iter().zip(pairs) {
-                let (there, back) = (Position::new(ay, ax), Position::new(by, bx));
-                for (channel, spline) in splines.iter().enumerate() {
-                    let sum = spline.near(y, x, &there) + spline.near(y, x, &back);
-                    rows[channel * width + x] += tap * sum;
-                }
-            }
+            *sample = if level == UNKNOWN_LEVEL {
+                T::nan()
+            } else {
+                *sample * kernel[0] + spline.weighted_sum(y, x, &path, &kernel[1..])
+            };
         }
     }
+}
+
+/// Writes the points ahead and behind, in turn, at 1, 2 .. `steps` px (even) from the pixel on its streamline.
+#[inline(always)]
+fn walk<T: Real>(
+    lines: &Streamlines<T>,
+    [y, x]: [usize; 2],
+    motion: [T; 2],
+    speed: T,
+    steps: usize,
+    path: &mut Path<T>,
+) {
+    // Two steps a stride.
+    let time = T::of(2.0) / speed;
+    let mut ahead = lines.start(y, x, motion, speed);
+    let mut behind = ahead;
+    path.clear();
+    for _ in 0..steps / 2 {
+        lines.stride(&mut ahead, time);
+        lines.stride(&mut behind, -time);
+        for point in [ahead.halfway, behind.halfway, ahead.offset, behind.offset] {
+            path.push(point);
+        }
+    }
+    path.prepare();
 }

@@ -20,7 +20,8 @@ use crate::control::Control;
 use crate::convolve::gaussian_taps;
 use crate::error::Result;
 use crate::gabor::{GaborBank, Responses};
-use crate::phase_gradient::{PhaseGradient, PhaseRow, phase_step};
+use crate::phase_gradient::{PhaseGradient, PhaseRow};
+use crate::phase_rate::phase_step;
 use crate::real::Real;
 
 /// Power of the coverage: half a window counts 0.4 %.

@@ -1,7 +1,7 @@
 //! Flow of Fleet and Jepson: velocity-tuned filters, local affine least squares.
 //!
 //! Each of the 22 filters of [`SpatiotemporalBank::velocity_tuned`] gives at the reference frame a
-//! phase gradient and, where the tests of [`crate::component_velocity`] hold, one constraint on the
+//! phase gradient and, where the tests of [`crate::component_tests`] hold, one constraint on the
 //! flow: with the unit normal `n = grad phi / |grad phi|` and the normal speed `s = v_n . n`,
 //!
 //! ```text
@@ -31,7 +31,8 @@ use ndarray::{Array2, Array3, ArrayView3};
 
 use crate::array::{for_each_row, require_frames};
 use crate::border::Border;
-use crate::component_velocity::{ComponentTests, component_velocity, largest_amplitude};
+use crate::component_tests::{ComponentTests, largest_amplitude};
+use crate::component_velocity::component_velocity;
 use crate::control::Control;
 use crate::convolve::correlate_axis;
 use crate::error::{Result, require};
@@ -40,7 +41,8 @@ use crate::flow::affine::{AffineFit, solve};
 use crate::flow::standardize::standardize;
 use crate::flow_field::FlowField;
 use crate::gabor::GaborParameters;
-use crate::phase_gradient::{PhaseGradient, rate_of_phase};
+use crate::phase_gradient::PhaseGradient;
+use crate::phase_rate::rate_of_phase;
 use crate::real::Real;
 use crate::spatiotemporal::{Channel, SpatiotemporalBank};
 

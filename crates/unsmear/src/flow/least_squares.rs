@@ -38,7 +38,7 @@ use ndarray::{Array2, Array3, ArrayView3, Axis};
 
 use crate::array::{for_each_row_with, require_frames};
 use crate::border::Border;
-use crate::component_velocity::{ComponentTests, largest_amplitude};
+use crate::component_tests::{ComponentTests, largest_amplitude};
 use crate::control::Control;
 use crate::convolve::{correlate_axis, gaussian_taps};
 use crate::error::{Error, Result, require};

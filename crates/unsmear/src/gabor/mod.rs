@@ -24,63 +24,23 @@
 //!
 //! Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), section 3 and appendix A.
 
-use std::f64::consts::{PI, TAU};
-
-use multiversion::multiversion;
-use ndarray::{Array4, ArrayView2};
+use ndarray::ArrayView2;
 
 use crate::array::{for_each_row, for_each_row_with};
 use crate::border::Border;
 use crate::control::Control;
-use crate::convolve::{even_odd_sums, gaussian_taps, pad_row};
-use crate::error::{Result, require};
+use crate::convolve::{gaussian_taps, pad_row};
+use crate::error::Result;
+use crate::even_odd::{difference, even_odd_sums, sum};
 use crate::real::Real;
 
-/// What a bank is tuned to; see the [module](self).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaborParameters {
-    /// `f0`, cycles/px, in (0, 0.5). Default 0.15: a wavelength of 6.7 px.
-    pub tuning_frequency: f64,
-    /// `beta`, octaves, in (0, 3]. Default 0.8, Fleet & Jepson's.
-    pub bandwidth_octaves: f64,
-    /// `N`, filters over 180 degrees, at least 2. Default 6: neighbours cross at half power.
-    pub orientations: usize,
-    /// Where the taps end, in deviations. Default 3: what is cut off weighs 0.3 %.
-    pub support: f64,
-}
+mod parameters;
+mod responses;
+mod taps;
 
-impl Default for GaborParameters {
-    fn default() -> Self {
-        Self { tuning_frequency: 0.15, bandwidth_octaves: 0.8, orientations: 6, support: 3.0 }
-    }
-}
-
-impl GaborParameters {
-    /// `k0`, rad/px: the one place where cycles become radians.
-    #[must_use]
-    pub fn wavenumber(&self) -> f64 {
-        TAU * self.tuning_frequency
-    }
-
-    /// Deviation of the Gaussian window, px.
-    #[must_use]
-    pub fn sigma(&self) -> f64 {
-        let ratio = self.bandwidth_octaves.exp2();
-        (ratio + 1.0) / ((ratio - 1.0) * self.wavenumber())
-    }
-
-    pub(crate) fn check(&self) -> Result<()> {
-        require("tuning_frequency", self.tuning_frequency, "in (0, 0.5) cycles/px", |f| {
-            f > 0.0 && f < 0.5
-        })?;
-        let octaves = self.bandwidth_octaves;
-        require("bandwidth_octaves", octaves, "in (0, 3]", |b| b > 0.0 && b <= 3.0)?;
-        require("orientations", self.orientations as f64, "in 2..=64", |n| {
-            (2.0..=64.0).contains(&n)
-        })?;
-        require("support", self.support, "in [1, 6] deviations", |s| (1.0..=6.0).contains(&s))
-    }
-}
+pub use parameters::GaborParameters;
+pub use responses::Responses;
+use taps::{EvenOdd, wavevector};
 
 /// Planned filters; see the [module](self). Build once, run on many pictures.
 #[derive(Debug, Clone)]
@@ -93,14 +53,6 @@ pub struct GaborBank<T> {
     pairs: Vec<MirrorPair<T>>,
 }
 
-/// Even and odd taps `0..=radius` of one complex factor; the odd ones are absent for `k = 0`.
-#[derive(Debug, Clone)]
-struct EvenOdd<T> {
-    even: Vec<T>,
-    odd: Vec<T>,
-    real: bool,
-}
-
 /// The filters at `(k_x, k_y)` and, unless it lies on an axis, at `(-k_x, k_y)`.
 #[derive(Debug, Clone)]
 struct MirrorPair<T> {
@@ -108,22 +60,6 @@ struct MirrorPair<T> {
     along_y: EvenOdd<T>,
     filter: usize,
     mirror: Option<usize>,
-}
-
-impl<T: Real> EvenOdd<T> {
-    /// Correlation taps of `g exp(i k x)`: the odd part changes sign against convolution's.
-    fn new(gaussian: &[f64], k: f64, free_of_mean: bool) -> Self {
-        let radius = gaussian.len() / 2;
-        let half = &gaussian[radius..];
-        let mut even: Vec<f64> =
-            half.iter().enumerate().map(|(j, g)| g * (k * j as f64).cos()).collect();
-        if free_of_mean {
-            let sum = even[0] + 2.0 * even[1..].iter().sum::<f64>();
-            even.iter_mut().zip(half).for_each(|(c, g)| *c -= g * sum);
-        }
-        let odd = half.iter().enumerate().map(|(j, g)| T::of(-g * (k * j as f64).sin())).collect();
-        Self { even: even.into_iter().map(T::of).collect(), odd, real: k == 0.0 }
-    }
 }
 
 impl<T: Real> GaborBank<T> {
@@ -195,7 +131,7 @@ impl<T: Real> GaborBank<T> {
         let filtered = self.filter_rows(picture, border, control)?;
         let planes = 2 * self.wavevectors.len();
         for_each_row_with(
-            &mut responses.data,
+            responses.packed_mut(),
             planes * width,
             control,
             // The last row stays 0: what a zero border reads.
@@ -276,87 +212,6 @@ impl<T: Real> GaborBank<T> {
     }
 }
 
-/// `out = a + b`.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn sum<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
-    let n = out.len();
-    let (a, b) = (&a[..n], &b[..n]);
-    for x in 0..n {
-        out[x] = a[x] + b[x];
-    }
-}
-
-/// `out = a - b`.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn difference<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
-    let n = out.len();
-    let (a, b) = (&a[..n], &b[..n]);
-    for x in 0..n {
-        out[x] = a[x] - b[x];
-    }
-}
-
-/// `k_j`; exact on the axes and exactly mirrored about them, as the shared passes assume.
-fn wavevector(k0: f64, j: usize, n: usize) -> [f64; 2] {
-    if 2 * j == n {
-        return [0.0, k0];
-    }
-    if 2 * j > n {
-        let [kx, ky] = wavevector(k0, n - j, n);
-        return [-kx, ky];
-    }
-    let theta = PI * j as f64 / n as f64;
-    [k0 * theta.cos(), k0 * theta.sin()]
-}
-
-/// Complex responses of `N` filters to a picture (H, W), the rows of all filters side by side so
-/// that a row of work touches one stretch of memory.
-#[derive(Debug, Clone)]
-pub struct Responses<T> {
-    data: Vec<T>,
-    filters: usize,
-    height: usize,
-    width: usize,
-}
-
-impl<T: Real> Responses<T> {
-    /// All responses 0.
-    #[must_use]
-    pub fn zeros(filters: usize, height: usize, width: usize) -> Self {
-        Self { data: vec![T::zero(); 2 * filters * height * width], filters, height, width }
-    }
-
-    /// (N, H, W).
-    #[must_use]
-    pub fn dim(&self) -> (usize, usize, usize) {
-        (self.filters, self.height, self.width)
-    }
-
-    /// Real and imaginary parts of all responses, (2, N, H, W), nothing copied: in memory the rows
-    /// of all filters lie side by side, (H, N, 2, W).
-    #[must_use]
-    pub fn into_array(self) -> Array4<T> {
-        let shape = (self.height, self.filters, 2, self.width);
-        Array4::from_shape_vec(shape, self.data).unwrap_or_default().permuted_axes([2, 1, 0, 3])
-    }
-
-    /// Real and imaginary parts of row `y` of filter `filter`.
-    #[inline]
-    #[must_use]
-    pub fn row(&self, filter: usize, y: usize) -> (&[T], &[T]) {
-        let start = (y * self.filters + filter) * 2 * self.width;
-        self.data[start..start + 2 * self.width].split_at(self.width)
-    }
-
-    /// Like [`Responses::row`], to write.
-    #[inline]
-    #[must_use]
-    pub fn row_mut(&mut self, filter: usize, y: usize) -> (&mut [T], &mut [T]) {
-        let start = (y * self.filters + filter) * 2 * self.width;
-        self.data[start..start + 2 * self.width].split_at_mut(self.width)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -390,9 +245,9 @@ mod tests {
     fn a_flat_picture_answers_with_nothing() {
         for orientations in [2, 3, 4, 5, 6] {
             let bank = bank(orientations);
-            let responses = respond(&bank, &Array2::from_elem((30, 31), 255.0));
+            let mut responses = respond(&bank, &Array2::from_elem((30, 31), 255.0));
             // 25 taps of order 0.1 on 255: rounding is below 1e-12.
-            assert!(responses.data.iter().all(|r| r.abs() < 1e-11));
+            assert!(responses.packed_mut().iter().all(|r| r.abs() < 1e-11));
         }
     }
 
@@ -436,22 +291,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn as_an_array_every_sample_keeps_its_place() {
-        let mut responses = Responses::<f32>::zeros(3, 4, 5);
-        responses.row_mut(2, 1).1[4] = 7.0;
-        let array = responses.into_array();
-        assert_eq!((array.shape(), array[(1, 2, 1, 4)]), (&[2, 3, 4, 5][..], 7.0));
-        assert_eq!(array.sum(), 7.0);
-    }
-
-    #[test]
-    fn parameters_outside_their_range_are_named() {
-        let bad = GaborParameters { tuning_frequency: 0.5, ..Default::default() };
-        let error = GaborBank::<f32>::new(&bad).unwrap_err().to_string();
-        assert_eq!(error, "tuning_frequency must be in (0, 0.5) cycles/px, got 0.5");
-        assert!(GaborBank::<f32>::new(&GaborParameters { orientations: 1, ..bad }).is_err());
     }
 }

@@ -1,0 +1,207 @@
+"""Types of the compiled core; the API is the Python package around it.
+
+Arrays may be strided where they come in and are new where they go out. `progress` is
+called with steps done and steps expected; what it raises cancels the call.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeAlias, TypedDict, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Single: TypeAlias = NDArray[np.float32]
+_Double: TypeAlias = NDArray[np.float64]
+_Complex: TypeAlias = NDArray[np.complex128]
+_Parameters: TypeAlias = Mapping[str, Any]
+_Progress: TypeAlias = Callable[[int, int], object]
+
+__all__ = [
+    "__version__",
+    "blur_f32",
+    "blur_f64",
+    "component_velocities",
+    "correlate_separable",
+    "error_map",
+    "fleet_jepson",
+    "fspecial_motion",
+    "gabor_phase_gradient",
+    "get_num_threads",
+    "least_squares",
+    "motion_psf",
+    "optimized",
+    "psnr",
+    "sample",
+    "set_num_threads",
+    "ssim",
+    "thesis_bank",
+    "thesis_deblur",
+    "thesis_flow",
+    "thesis_gated_mean",
+    "thesis_stages",
+    "wiener_f32",
+    "wiener_f64",
+]
+
+__version__: str
+optimized: bool
+
+# Flow.
+
+# float32 or float64, and the same out.
+def component_velocities(
+    frames: NDArray[Any],
+    index: int,
+    parameters: _Parameters,
+    *,
+    progress: _Progress | None = None,
+) -> tuple[NDArray[Any], list[list[float]]]: ...
+def gabor_phase_gradient(
+    picture: _Double, parameters: _Parameters
+) -> tuple[_Complex, _Double, _Double]: ...
+def correlate_separable(
+    volume: _Double, taps: Sequence[Sequence[float]], border: str
+) -> _Double: ...
+@overload
+def least_squares(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: Literal[False] = False,
+    progress: _Progress | None = None,
+) -> tuple[_Single, _Single]: ...
+@overload
+def least_squares(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: Literal[True],
+    progress: _Progress | None = None,
+) -> tuple[_Double, _Double]: ...
+@overload
+def least_squares(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: bool,
+    progress: _Progress | None = None,
+) -> tuple[NDArray[Any], NDArray[Any]]: ...
+@overload
+def fleet_jepson(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: Literal[False] = False,
+    progress: _Progress | None = None,
+) -> tuple[_Single, _Single]: ...
+@overload
+def fleet_jepson(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: Literal[True],
+    progress: _Progress | None = None,
+) -> tuple[_Double, _Double]: ...
+@overload
+def fleet_jepson(
+    frames: _Double,
+    index: int,
+    parameters: _Parameters,
+    *,
+    double: bool,
+    progress: _Progress | None = None,
+) -> tuple[NDArray[Any], NDArray[Any]]: ...
+
+# The founding flow method and its stages.
+
+class _ThesisBank(TypedDict):
+    sigma: float
+    angles: _Double
+    temporal_taps: _Double
+    windows: _Complex
+    kept: NDArray[np.bool_]
+    kernels: _Complex
+
+class _ThesisStages(TypedDict):
+    moving: _Double
+    responses: _Complex
+    phi_x: _Double
+    phi_y: _Double
+    phi_t: _Double
+    un: _Double
+    vn: _Double
+
+def thesis_bank(
+    shape: tuple[int, ...], tuning_frequency: float, bandwidth_octaves: float
+) -> _ThesisBank: ...
+def thesis_stages(frames: _Double, parameters: _Parameters) -> _ThesisStages: ...
+def thesis_gated_mean(
+    values: _Double, std_limit: float, distance_limit: float, least_fraction: float
+) -> tuple[_Double, _Double]: ...
+def thesis_flow(
+    frames: _Double, parameters: _Parameters, *, progress: _Progress | None = None
+) -> _Double: ...
+
+# Pictures between pixels.
+
+def sample(
+    picture: _Double, y: _Double, x: _Double, degree: int, border: str
+) -> _Double: ...
+
+# Blur, deblurring and their kernels.
+
+def motion_psf(velocity: Sequence[float], acceleration: Sequence[float]) -> _Double: ...
+def fspecial_motion(length: float, angle: float) -> _Double: ...
+
+# The caller picks the function by the type of the picture, which no checker follows.
+def blur_f32(
+    image: NDArray[Any],
+    flow: NDArray[Any],
+    exposure: float,
+    progress: _Progress | None = None,
+) -> _Single: ...
+def blur_f64(
+    image: NDArray[Any],
+    flow: NDArray[Any],
+    exposure: float,
+    progress: _Progress | None = None,
+) -> _Double: ...
+def wiener_f32(
+    image: NDArray[Any],
+    flow: NDArray[Any],
+    exposure: float,
+    noise: float | None = None,
+    regularization: float | None = None,
+    progress: _Progress | None = None,
+) -> tuple[_Single, dict[str, Any]]: ...
+def wiener_f64(
+    image: NDArray[Any],
+    flow: NDArray[Any],
+    exposure: float,
+    noise: float | None = None,
+    regularization: float | None = None,
+    progress: _Progress | None = None,
+) -> tuple[_Double, dict[str, Any]]: ...
+def thesis_deblur(
+    image: _Double,
+    flow: _Double,
+    degree: int,
+    regularization: float,
+    progress: _Progress | None = None,
+) -> tuple[_Double, int]: ...
+
+# Metrics.
+
+def error_map(name: str, flow: _Double, truth: _Double) -> _Double: ...
+def psnr(a: _Double, b: _Double, data_range: float) -> float: ...
+def ssim(a: _Double, b: _Double, data_range: float) -> float: ...
+
+# Threads.
+
+def set_num_threads(n: int) -> None: ...
+def get_num_threads() -> int: ...
