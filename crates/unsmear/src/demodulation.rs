@@ -43,9 +43,8 @@ impl<T: Real> Stencil<T> {
         power: &[T],
         out: &mut [T],
     ) {
-        demodulated_rate(re, im, rows, &self.cosines, &self.sines, power, out);
         let k = T::of(self.wavenumber);
-        out.iter_mut().for_each(|rate| *rate += k);
+        demodulated_rate(re, im, rows, [&self.cosines, &self.sines], power, k, out);
     }
 
     /// What `z` in a straight line through its values `first` (at the edge) and `second` (next to
@@ -128,15 +127,15 @@ fn rotate<T: Real>([re, im]: [T; 2], angle: f64) -> [T; 2] {
     [re * cos - im * sin, re * sin + im * cos]
 }
 
-/// `Im(conj(R) D z) / |R|^2` with `D z = sum_n (c_n - i s_n) R(+n)`.
+/// `k + Im(conj(R) D z) / |R|^2` with `D z = sum_n (c_n - i s_n) R(+n)`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn demodulated_rate<T: Real>(
     re: &[T],
     im: &[T],
     rows: &[ComplexRow<'_, T>; 4],
-    cosines: &[T; 4],
-    sines: &[T; 4],
+    [cosines, sines]: [&[T; 4]; 2],
     power: &[T],
+    wavenumber: T,
     out: &mut [T],
 ) {
     let n = out.len();
@@ -154,6 +153,6 @@ fn demodulated_rate<T: Real>(
             + (cosines[1] * b_im[x] - sines[1] * b_re[x])
             + (cosines[2] * c_im[x] - sines[2] * c_re[x])
             + (cosines[3] * d_im[x] - sines[3] * d_re[x]);
-        out[x] = (re[x] * slope_im - im[x] * slope_re) / power[x];
+        out[x] = (re[x] * slope_im - im[x] * slope_re) / power[x] + wavenumber;
     }
 }

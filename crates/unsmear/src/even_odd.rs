@@ -64,6 +64,26 @@ pub(crate) fn even_odd_sums<T: Real>(
     }
 }
 
+/// `out = a + b`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(crate) fn sum<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        out[x] = a[x] + b[x];
+    }
+}
+
+/// `out = a - b`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(crate) fn difference<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for x in 0..n {
+        out[x] = a[x] - b[x];
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

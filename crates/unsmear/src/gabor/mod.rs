@@ -31,7 +31,7 @@ use crate::border::Border;
 use crate::control::Control;
 use crate::convolve::{gaussian_taps, pad_row};
 use crate::error::Result;
-use crate::even_odd::even_odd_sums;
+use crate::even_odd::{difference, even_odd_sums, sum};
 use crate::real::Real;
 
 mod parameters;
@@ -202,16 +202,12 @@ impl<T: Real> GaborBank<T> {
         }
         let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
         let (re, im) = out[plane(pair.filter)].split_at_mut(width);
-        for x in 0..width {
-            re[x] = ac[x] - sb[x];
-            im[x] = sa[x] + bc[x];
-        }
+        difference(ac, sb, re);
+        sum(sa, bc, im);
         if let Some(mirror) = pair.mirror {
             let (re, im) = out[plane(mirror)].split_at_mut(width);
-            for x in 0..width {
-                re[x] = ac[x] + sb[x];
-                im[x] = sa[x] - bc[x];
-            }
+            sum(ac, sb, re);
+            difference(sa, bc, im);
         }
     }
 }
