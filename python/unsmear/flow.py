@@ -114,9 +114,9 @@ def optical_flow(
         shows them best, not the rms of all), ``residual_scale=1.0`` (rad: where a
         constraint loses half its weight), ``tau=1.25`` (deviations off the tuned
         frequency where weights halve), ``amplitude_fraction=0.05`` (of the rms
-        amplitude) plus ``amplitude_floor=0.25`` (where weights halve; grey levels of a
+        amplitude) plus ``amplitude_floor=0.2`` (where weights halve; grey levels of a
         picture with a standard deviation of 64), ``median_radius=5`` (px, of the
-        weighted median at motion boundaries; 0 leaves it out), ``guide_sigma=8.0``
+        weighted median at motion boundaries; 0 leaves it out), ``guide_sigma=10.0``
         (grey levels it tolerates), ``frames_each_side=0`` (0: two frames),
         ``choose_frames=False`` (fall back to two frames where more disagree),
         ``adapt_to_noise=True`` (smooth more and trust edges less in a noisy picture),

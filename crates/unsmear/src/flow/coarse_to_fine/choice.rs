@@ -12,7 +12,7 @@
 //! `w_2` wins everywhere when the mean of `E(w_S)` exceeds that of `E(w_2)` by more than
 //! [`WORST_RATIO`] (objects that turn, occlusion), or when the mean `|delta|` exceeds
 //! [`WORST_BIAS`] (acceleration: small errors that all point the same way). Else `w_S` holds wherever
-//! `E(w_S) < 2 E(w_2) + 0.02`. `G_s *` is a Gaussian average of deviation s px.
+//! `E(w_S) < 2 E(w_2) + 0.02`, and where it leads out of the next frame, which then cannot judge. `G_s *` is a Gaussian average of deviation s px.
 
 use ndarray::{Array2, Zip};
 
@@ -32,6 +32,8 @@ const WORST_BIAS: f64 = 0.045;
 const SIGMA: [f64; 2] = [3.0, 8.0];
 /// Mismatch by which several frames may always be worse: what noise does to the fit of one frame.
 const SLACK: f32 = 0.02;
+/// Share of the weight under `w_2` that `w_S` must leave in view for the next frame to judge it.
+const JUDGING: f32 = 0.7;
 /// Mismatch of which nobody is to be blamed.
 const SMALL: f64 = 1e-3;
 
@@ -39,6 +41,8 @@ const SMALL: f64 = 1e-3;
 pub(super) struct Mismatch {
     /// `E`, (H, W).
     pub(super) map: Array2<f32>,
+    /// `G_3 * sum W_0`: how much of the next frame could judge.
+    pub(super) weight: Array2<f32>,
     /// Mean of `|delta|`, px/frame.
     pub(super) bias: f64,
 }
@@ -86,7 +90,8 @@ pub(super) fn mismatch(seen: &Explanation<'_>, control: &Control) -> Result<Mism
         power / (power + floor) * (1.0 - alike)
     })?;
     let map = Zip::from(&lost).and(&weight).map_collect(|l, w| l / (w + 0.05));
-    Ok(Mismatch { map, bias: bias(seen, control)? })
+    let bias = bias(seen, control)?;
+    Ok(Mismatch { map, weight, bias })
 }
 
 /// Mean of `|delta|`.
@@ -127,9 +132,13 @@ pub(super) fn several_hold(two: &Mismatch, several: &Mismatch) -> Array2<bool> {
     let mean = |m: &Mismatch| m.map.iter().map(|&e| f64::from(e)).sum::<f64>() / m.map.len() as f64;
     let ratio = (mean(several) + SMALL) / (mean(two) + SMALL);
     let help = ratio <= WORST_RATIO && several.bias <= WORST_BIAS;
-    Zip::from(&two.map)
+    let mut hold = Zip::from(&two.map)
         .and(&several.map)
-        .map_collect(|two, several| help && *several < 2.0 * two + SLACK)
+        .map_collect(|two, several| help && *several < 2.0 * two + SLACK);
+    Zip::from(&mut hold).and(&two.weight).and(&several.weight).for_each(|hold, two, several| {
+        *hold |= help && *several < JUDGING * two;
+    });
+    hold
 }
 
 /// The flow and confidence of `several` where `hold`, else of `two`.

@@ -96,7 +96,7 @@ impl CoarseToFine {
             channels: &channels,
         };
         let others: Vec<&FramePyramid> = others.iter().collect();
-        let summit = if self.choose_frames && others.len() > 1 {
+        let summit = if self.choose_frames {
             choose(&climb, &others, control)?
         } else {
             control.expect(climb.steps());
@@ -152,7 +152,6 @@ impl CoarseToFine {
 
 /// The flow of all frames where motion is constant over them, else that of the reference and the next.
 fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
-    control.expect(2 * climb.steps());
     let next: Vec<&FramePyramid> =
         others.iter().copied().filter(|frame| frame.offset == 1.0).collect();
     let [smoothness, edges, residual] = FOR_TWO_FRAMES;
@@ -161,6 +160,11 @@ fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Res
     settings.edges.sensitivity *= edges;
     settings.residual *= residual as f32;
     let of_two = Climb { settings: &settings, ..*climb };
+    if others.len() == next.len() {
+        control.expect(of_two.steps());
+        return of_two.run(&next, control);
+    }
+    control.expect(of_two.steps() + climb.steps());
     let two = of_two.run(&next, control)?;
     let several = climb.run(others, control)?;
     let hold = climb.at(climb.finest, &next, control, |level| {
