@@ -12,10 +12,11 @@ import numpy as np
 from unsmear import metrics, plot
 from unsmear._atomic import write_bytes_atomic
 from unsmear._progress import ProgressBar
+from unsmear._velocity import velocity_of_frame
 from unsmear.cli import _common
 from unsmear.deblur import deblur
 from unsmear.demo_clip import DemoClip, demo_clip
-from unsmear.flow import FlowResult, optical_flow
+from unsmear.flow import FlowResult
 from unsmear.images import write_image
 from unsmear.sequences import write_frames
 
@@ -26,14 +27,6 @@ if TYPE_CHECKING:
 
 SUMMARY = "the whole job on a bundled clip: flow, deblurred frames, errors"
 EXAMPLE = "unsmear demo -o unsmear_demo"
-
-# The clip moves up to 5.3 px/frame, within half a wavelength of this frequency; a
-# narrow neighbourhood keeps the disc's outline.
-_FLOW: dict[str, Any] = {
-    "method": "least-squares",
-    "tuning_frequency": 0.09,
-    "neighbourhood": 3.0,
-}
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
@@ -91,9 +84,9 @@ def run(options: argparse.Namespace) -> None:
 def _restore(clip: DemoClip, bar: ProgressBar) -> tuple[list[FlowResult], NDArray[Any]]:
     flows, restored = [], []
     for index, frame in enumerate(clip.blurred):
-        flow = optical_flow(clip.blurred, index=index, channel_axis=3, **_FLOW)
+        velocity, flow = velocity_of_frame(clip.blurred, index, channel_axis=3)
         flows.append(flow)
-        result = deblur(frame, flow.flow, exposure=clip.exposure, channel_axis=2)
+        result = deblur(frame, velocity, exposure=clip.exposure, channel_axis=2)
         restored.append(result.image)
         bar((index + 1) / len(clip.blurred))
     return flows, np.stack(restored)
