@@ -14,7 +14,6 @@
 //! | 5 | `sor::layout`, `weighted_median::window` | |
 //! | 6 | `sor::relax` | |
 //! | 7 | [`sor`], [`weighted_median`] | solver of the default flow; median with weights |
-//! | 8 | `sor::tests`, `weighted_median::tests` | |
 //! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
 //! | 7 | [`phase_gradient`] | phase in space |

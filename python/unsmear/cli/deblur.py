@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear._progress import ProgressBar
+from unsmear._velocity import velocity_of_frame
 from unsmear.cli import _common
 from unsmear.deblur import METHODS, deblur
-from unsmear.flow import optical_flow
 from unsmear.flow_files import read_flow
 from unsmear.sequences import write_frames
 
@@ -41,7 +41,7 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
         "--noise", type=float, help="standard deviation; default measured"
     )
     verb.add_argument("--flow", help="flow file to use for all frames, not measured")
-    _common.add_flow_method(verb, "--flow-method", "least-squares")
+    _common.add_flow_method(verb, "--flow-method", "balanced")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -83,10 +83,11 @@ def _flow_of(
     if len(frames) < 2:
         msg = "one frame alone shows no motion: give more frames, or --flow"
         raise ValueError(msg)
-    return optical_flow(
+    velocity, _ = velocity_of_frame(
         frames,
-        index=index,
+        index,
         method=options.flow_method,
         channel_axis=_common.channel_axis_of(frames),
         **_common.parameters_of(options),
-    ).flow
+    )
+    return velocity

@@ -24,7 +24,7 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "-o", "--output", required=True, metavar="FLOW", help=".flo .pfm .png .npy .npz"
     )
-    _common.add_flow_method(verb, "--method", "least-squares")
+    _common.add_flow_method(verb, "--method", "balanced")
     verb.add_argument("--index", type=int, help="frame to measure; default the middle")
     verb.add_argument("--plot", metavar="PNG", help="draw the flow with its legend")
 

@@ -1,0 +1,58 @@
+"""Velocity at the middle of a frame's exposure: what blurs it.
+
+Flow tells where a pixel goes until the next frame. What blurs frame i is its velocity
+at time i, to second order the mean of the flow forwards and the negative flow
+backwards,
+
+    v(i) = (f(i -> i + 1) - f(i -> i - 1)) / 2      px/frame,
+
+one of them at the ends of a sequence and where the other is unknown. The methods that
+look at frames on both sides measure it by themselves.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unsmear.flow import FlowResult, optical_flow
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_FORWARD_METHODS = ("fast", "balanced", "accurate")
+
+
+def velocity_of_frame(
+    frames: NDArray[Any], index: int, *, method: str = "balanced", **options: Any
+) -> tuple[NDArray[np.float32], FlowResult]:
+    """Return the velocity (H, W, 2) of frame ``index`` and the flow it comes from.
+
+    The flow is that to the next frame, or for the last frame that to the one before.
+    """
+    count = len(frames)
+    if count < 2:
+        msg = f"frames must be at least 2 to show motion, got {count}"
+        raise ValueError(msg)
+    if method not in (*_FORWARD_METHODS, "steady"):
+        result = optical_flow(frames, index=index, method=method, **options)
+        return result.flow, result
+    if method == "steady" and index < count - 1:
+        result = optical_flow(frames, index=index, method=method, **options)
+        return result.flow, result
+    ways = []
+    if index < count - 1:
+        pair = frames[index : index + 2]
+        ways.append(optical_flow(pair, index=0, method=method, **options))
+    if index > 0:
+        pair = frames[index - 1 : index + 1][::-1]
+        ways.append(optical_flow(pair, index=0, method=method, **options))
+    signs = (1, -1) if index < count - 1 else (-1,)
+    flows = [sign * way.flow for sign, way in zip(signs, ways, strict=False)]
+    if len(flows) == 1:
+        return flows[0], ways[0]
+    forward, backward = flows
+    mean = (forward + backward) / 2
+    mean = np.where(np.isnan(mean), forward, mean)
+    return np.where(np.isnan(mean), backward, mean).astype(np.float32), ways[0]
