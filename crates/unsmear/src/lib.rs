@@ -15,6 +15,7 @@
 //! | 6 | `sor::relax` | |
 //! | 7 | [`sor`], [`weighted_median`] | solver of the default flow; median with weights |
 //! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
+//! | 6 | `gabor::respond` | its passes |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
 //! | 7 | [`phase_gradient`] | phase in space |
 //! | 8 | [`component_velocity`] | what one filter sees of the motion |

@@ -18,7 +18,7 @@
 
 use ndarray::{Array2, ArrayView2, Axis};
 
-use crate::array::for_each_row;
+use crate::array::for_each_row_with;
 use crate::border::Border;
 use crate::control::Control;
 use crate::convolve::{correlate_axis, gaussian_taps};
@@ -68,24 +68,28 @@ pub fn resample<T: Real>(
     kind: Resampling,
     control: &Control,
 ) -> Result<Array2<T>> {
+    let (rows, columns) = picture.dim();
+    if (rows, columns) == (height, width) {
+        return Ok(picture.to_owned());
+    }
     let mut out = Array2::zeros((height, width));
     if picture.is_empty() {
         return Ok(out);
     }
     let picture = picture.as_standard_layout();
     let source = picture.as_slice().unwrap_or_default();
-    let (rows, columns) = picture.dim();
-    let down = reads(rows, height, kind);
-    let across = reads(columns, width, kind);
+    let (down, across) = (reads::<T>(rows, height, kind), reads::<T>(columns, width, kind));
     let target = out.as_slice_mut().unwrap_or_default();
-    for_each_row(target, width, control, |y, out| {
-        let mut line = vec![T::zero(); columns];
-        for &(k, weight) in &down[y] {
+    let scratch = || vec![T::zero(); columns];
+    for_each_row_with(target, width, control, scratch, |y, out, line| {
+        line.fill(T::zero());
+        for (&k, &weight) in down.samples(y).zip(down.weights(y)) {
             let row = &source[k * columns..(k + 1) * columns];
-            line.iter_mut().zip(row).for_each(|(sum, &s)| *sum += T::of(weight) * s);
+            line.iter_mut().zip(row).for_each(|(sum, &s)| *sum += weight * s);
         }
-        for (out, taps) in out.iter_mut().zip(&across) {
-            *out = taps.iter().fold(T::zero(), |sum, &(k, w)| sum + T::of(w) * line[k]);
+        for (x, out) in out.iter_mut().enumerate() {
+            let taps = across.samples(x).zip(across.weights(x));
+            *out = taps.fold(T::zero(), |sum, (&k, &w)| sum + w * line[k]);
         }
     })?;
     Ok(out)
@@ -124,23 +128,45 @@ pub fn pyramid<T: Real>(
     Ok(levels)
 }
 
-/// For each of `to` samples, the samples it reads of `from` and their weights.
-fn reads(from: usize, to: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>> {
+/// What each sample of a line reads of another line: the same number of samples for all.
+struct Reads<T> {
+    count: usize,
+    samples: Vec<usize>,
+    weights: Vec<T>,
+}
+
+impl<T> Reads<T> {
+    fn samples(&self, i: usize) -> std::slice::Iter<'_, usize> {
+        self.samples[i * self.count..(i + 1) * self.count].iter()
+    }
+
+    fn weights(&self, i: usize) -> std::slice::Iter<'_, T> {
+        self.weights[i * self.count..(i + 1) * self.count].iter()
+    }
+}
+
+fn reads<T: Real>(from: usize, to: usize, kind: Resampling) -> Reads<T> {
     let step = from as f64 / to as f64;
-    (0..to)
-        .map(|i| {
-            let position = (i as f64 + 0.5) * step - 0.5;
-            let first = position.floor();
-            let t = position - first;
-            let weights = match kind {
-                Resampling::Linear => vec![(0, 1.0 - t), (1, t)],
-                Resampling::Cubic => (-1..=2).map(|k| (k, keys(t - f64::from(k)))).collect(),
+    let offsets = match kind {
+        Resampling::Linear => 0..2,
+        Resampling::Cubic => -1..3,
+    };
+    let mut reads = Reads { count: offsets.len(), samples: Vec::new(), weights: Vec::new() };
+    for i in 0..to {
+        let position = (i as f64 + 0.5) * step - 0.5;
+        let first = position.floor();
+        for offset in offsets.clone() {
+            let distance = position - first - offset as f64;
+            let weight = match kind {
+                Resampling::Linear => 1.0 - distance.abs(),
+                Resampling::Cubic => keys(distance),
             };
-            let at = |k: i32| Border::Replicate.index(first as isize + k as isize, from);
-            let reads = weights.into_iter().filter(|&(_, w)| w != 0.0);
-            reads.filter_map(|(k, w)| at(k).map(|k| (k, w))).collect()
-        })
-        .collect()
+            let sample = Border::Replicate.index(first as isize + offset, from);
+            reads.samples.push(sample.unwrap_or_default());
+            reads.weights.push(T::of(weight));
+        }
+    }
+    reads
 }
 
 /// Keys' cubic at distance `t`.

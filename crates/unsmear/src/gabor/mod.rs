@@ -24,17 +24,12 @@
 //!
 //! Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), section 3 and appendix A.
 
-use ndarray::ArrayView2;
-
-use crate::array::{for_each_row, for_each_row_with};
-use crate::border::Border;
-use crate::control::Control;
-use crate::convolve::{gaussian_taps, pad_row};
+use crate::convolve::gaussian_taps;
 use crate::error::Result;
-use crate::even_odd::{difference, even_odd_sums, sum};
 use crate::real::Real;
 
 mod parameters;
+mod respond;
 mod responses;
 mod taps;
 
@@ -112,109 +107,13 @@ impl<T: Real> GaborBank<T> {
     pub fn wavevectors(&self) -> &[[f64; 2]] {
         &self.wavevectors
     }
-
-    /// Responses of all filters to a picture (H, W).
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`](crate::Error::Cancelled).
-    pub fn respond(
-        &self,
-        picture: ArrayView2<'_, T>,
-        border: Border,
-        control: &Control,
-    ) -> Result<Responses<T>> {
-        let (height, width) = picture.dim();
-        let mut responses = Responses::zeros(self.wavevectors.len(), height, width);
-        if picture.is_empty() {
-            return Ok(responses);
-        }
-        let filtered = self.filter_rows(picture, border, control)?;
-        let planes = 2 * self.wavevectors.len();
-        for_each_row_with(
-            responses.packed_mut(),
-            planes * width,
-            control,
-            // The last row stays 0: what a zero border reads.
-            || vec![T::zero(); 5 * width],
-            |y, out, scratch| {
-                for pair in &self.pairs {
-                    self.filter_column(pair, &filtered, [y, height, width], border, scratch, out);
-                }
-            },
-        )?;
-        Ok(responses)
-    }
-
-    /// The picture filtered along x: per row, an even and an odd line for each set of taps.
-    fn filter_rows(
-        &self,
-        picture: ArrayView2<'_, T>,
-        border: Border,
-        control: &Control,
-    ) -> Result<Vec<T>> {
-        let picture = picture.as_standard_layout();
-        let (height, width) = picture.dim();
-        let packed = picture.as_slice().unwrap_or_default();
-        let lines = 2 * self.along_x.len();
-        let mut filtered = vec![T::zero(); height * lines * width];
-        for_each_row(&mut filtered, lines * width, control, |y, out| {
-            let mut padded = vec![T::zero(); width + 2 * self.radius];
-            pad_row(&packed[y * width..(y + 1) * width], self.radius, border, &mut padded);
-            let shifted: Vec<&[T]> = (0..=2 * self.radius).map(|j| &padded[j..j + width]).collect();
-            for (taps, out) in self.along_x.iter().zip(out.chunks_mut(2 * width)) {
-                let (even, odd) = out.split_at_mut(width);
-                even_odd_sums(&shifted, &taps.even, &taps.odd, even, odd);
-            }
-        })?;
-        Ok(filtered)
-    }
-
-    /// One row of the responses of a pair of mirrored filters.
-    fn filter_column(
-        &self,
-        pair: &MirrorPair<T>,
-        filtered: &[T],
-        [y, height, width]: [usize; 3],
-        border: Border,
-        scratch: &mut [T],
-        out: &mut [T],
-    ) {
-        let stride = 2 * self.along_x.len() * width;
-        let (scratch, zeros) = scratch.split_at_mut(4 * width);
-        let zeros = &*zeros;
-        let line = |j: usize, part: usize| {
-            border.index((y + j) as isize - self.radius as isize, height).map_or(zeros, |row| {
-                let start = row * stride + (2 * pair.along_x + part) * width;
-                &filtered[start..start + width]
-            })
-        };
-        let lines = |part| (0..=2 * self.radius).map(|j| line(j, part)).collect::<Vec<&[T]>>();
-        let (first, second) = scratch.split_at_mut(2 * width);
-        let (ac, sa) = first.split_at_mut(width);
-        let (bc, sb) = second.split_at_mut(width);
-        let taps = &pair.along_y;
-        even_odd_sums(&lines(0), &taps.even, &taps.odd, ac, sa);
-        if self.along_x[pair.along_x].real {
-            bc.fill(T::zero());
-            sb.fill(T::zero());
-        } else {
-            even_odd_sums(&lines(1), &taps.even, &taps.odd, bc, sb);
-        }
-        let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
-        let (re, im) = out[plane(pair.filter)].split_at_mut(width);
-        difference(ac, sb, re);
-        sum(sa, bc, im);
-        if let Some(mirror) = pair.mirror {
-            let (re, im) = out[plane(mirror)].split_at_mut(width);
-            sum(ac, sb, re);
-            difference(sa, bc, im);
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::border::Border;
+    use crate::control::Control;
     use ndarray::Array2;
 
     fn bank(orientations: usize) -> GaborBank<f64> {

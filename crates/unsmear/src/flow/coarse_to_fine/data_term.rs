@@ -49,7 +49,7 @@ pub(super) struct Reweighting {
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn accumulate(
-    frames: &[Vec<f32>],
+    frames: &[&[f32]],
     flow: Planes<'_>,
     warped_with: Planes<'_>,
     width: usize,
@@ -152,8 +152,16 @@ mod tests {
         let mut equations = NormalEquations::zeros(n);
         let reweighting = Reweighting { residual: 0.5, scale: 0.3 };
         let (flow, with) = ([&u[..], &v[..]], [&u0[..], &v0[..]]);
-        accumulate(&[constraints], flow, with, width, reweighting, &mut equations, &Control::new())
-            .unwrap();
+        accumulate(
+            &[&constraints],
+            flow,
+            with,
+            width,
+            reweighting,
+            &mut equations,
+            &Control::new(),
+        )
+        .unwrap();
         let e = &equations;
         for i in 0..n {
             let left = e.a11[i] * truth[0] + e.a12[i] * truth[1];

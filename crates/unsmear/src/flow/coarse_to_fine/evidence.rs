@@ -18,6 +18,7 @@
 
 use ndarray::{Array2, Zip};
 
+use crate::array::{for_each_row, for_each_row_with};
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -36,28 +37,35 @@ const GRADIENT_SIGMA: f64 = 2.0;
 const GRADIENT_LOSS: f32 = 2.0;
 
 /// Adds one frame's coherence to `sum`, times `share`.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn add_coherence(
-    reference: &Responses<f32>,
-    warped: &Responses<f32>,
+    responses: [&Responses<f32>; 2],
     visible: &[f32],
     floor: f32,
     share: f32,
     sum: &mut Array2<f32>,
-) {
-    let (filters, height, width) = reference.dim();
-    for (y, mut out) in sum.rows_mut().into_iter().enumerate().take(height) {
-        let (mut alike, mut power) = (vec![0.0; width], vec![0.0; width]);
+    control: &Control,
+) -> Result<()> {
+    let (filters, _, width) = responses[0].dim();
+    let samples = sum.as_slice_mut().unwrap_or_default();
+    let scratch = || (vec![0.0f32; width], vec![0.0f32; width]);
+    for_each_row_with(samples, width, control, scratch, |y, out, (alike, power)| {
+        alike.fill(0.0);
+        power.fill(0.0);
         for j in 0..filters {
-            let ((a, b), (c, d)) = (reference.row(j, y), warped.row(j, y));
+            let [(a, b), (c, d)] = responses.map(|r| r.row(j, y));
             for x in 0..width {
                 alike[x] += a[x] * c[x] + b[x] * d[x];
                 power[x] += 0.5 * (a[x] * a[x] + b[x] * b[x] + c[x] * c[x] + d[x] * d[x]);
             }
         }
+        let seen = &visible[y * width..(y + 1) * width];
         for x in 0..width {
-            out[x] += share * visible[y * width + x] * alike[x] / (power[x] + floor);
+            out[x] += share * seen[x] * alike[x] / (power[x] + floor);
         }
-    }
+    })
 }
 
 /// Confidence from the coherence and the flow.
@@ -70,22 +78,35 @@ pub(super) fn confidence(
     control: &Control,
 ) -> Result<Array2<f32>> {
     let coherence = smooth(coherence.view(), COHERENCE_SIGMA, control)?;
-    let steep =
-        Array2::from_shape_fn(flow.dim(), |at| (slope(&flow.u, at) + slope(&flow.v, at)).sqrt());
+    let steep = steepness(flow, control)?;
     let steep = smooth(steep.view(), GRADIENT_SIGMA, control)?;
     Ok(Zip::from(&coherence)
         .and(&steep)
         .map_collect(|c, s| c.clamp(0.0, 1.0) * (-GRADIENT_LOSS * s).exp()))
 }
 
-/// `|grad|^2` by central differences, one-sided at the edge.
-fn slope(plane: &Array2<f32>, (y, x): (usize, usize)) -> f32 {
-    let (height, width) = plane.dim();
+/// `|grad (u, v)|` by central differences, one-sided at the edge.
+fn steepness(flow: &FlowField<f32>, control: &Control) -> Result<Array2<f32>> {
+    let (height, width) = flow.dim();
+    let planes = [&flow.u, &flow.v].map(|plane| plane.as_slice().unwrap_or_default());
     let span = |i: usize, n: usize| (i.saturating_sub(1), (i + 1).min(n - 1));
-    let ((y0, y1), (x0, x1)) = (span(y, height), span(x, width));
-    let gx = (plane[(y, x1)] - plane[(y, x0)]) / (x1 - x0).max(1) as f32;
-    let gy = (plane[(y1, x)] - plane[(y0, x)]) / (y1 - y0).max(1) as f32;
-    gx * gx + gy * gy
+    let mut out = Array2::zeros((height, width));
+    for_each_row(out.as_slice_mut().unwrap_or_default(), width, control, |y, out| {
+        let (y0, y1) = span(y, height);
+        let down = 1.0 / (y1 - y0).max(1) as f32;
+        for plane in planes {
+            let row = |y: usize| &plane[y * width..(y + 1) * width];
+            let (above, here, below) = (row(y0), row(y), row(y1));
+            for (x, out) in out.iter_mut().enumerate() {
+                let (x0, x1) = span(x, width);
+                let gx = (here[x1] - here[x0]) / (x1 - x0).max(1) as f32;
+                let gy = (below[x] - above[x]) * down;
+                *out += gx * gx + gy * gy;
+            }
+        }
+        out.iter_mut().for_each(|square: &mut f32| *square = square.sqrt());
+    })?;
+    Ok(out)
 }
 
 /// The greater of the evidence of the coarser levels and of this level's trace of the data term.

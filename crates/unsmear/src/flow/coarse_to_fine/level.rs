@@ -11,7 +11,7 @@
 //! The warped picture is filtered, not the responses warped: the phase of a response turns with the
 //! flow's gradient, and only so do both frames see the same neighbourhood.
 
-use ndarray::{Array2, Zip};
+use ndarray::Array2;
 
 use super::choice::{Explanation, Mismatch, mismatch};
 use super::evidence::add_coherence;
@@ -21,7 +21,7 @@ use super::still::{Rest, look_for_rest};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
-use crate::flow_field::{FlowField, FlowView};
+use crate::flow_field::FlowField;
 use crate::gabor::{GaborBank, Responses};
 use crate::interpolate::{SplineDegree, SplineImage};
 
@@ -73,6 +73,17 @@ pub(super) struct Level<'a> {
     pub(super) others: Vec<Target<'a>>,
 }
 
+/// What a look sees, and the memory it needs; reused from look to look.
+pub(super) struct Sight {
+    /// Responses to the warped frame.
+    pub(super) responses: Responses<f32>,
+    /// Weights of its pixels, (H, W).
+    pub(super) visible: Vec<f32>,
+    /// Constraints, (H, N, 4, W), where they were asked for.
+    pub(super) constraints: Vec<f32>,
+    scratch: Vec<f32>,
+}
+
 impl<'a> Level<'a> {
     /// Prepares a level from the reference frame, its guide channels and the other frames.
     pub(super) fn new(
@@ -110,34 +121,86 @@ impl<'a> Level<'a> {
         })
     }
 
-    /// What rests between the reference and the frame nearest to it; see [`super::still`].
-    pub(super) fn look_for_rest(&self, control: &Control) -> Result<Option<Rest>> {
-        if !self.settings.still {
-            return Ok(None);
+    /// Memory for looks at this level.
+    pub(super) fn sight(&self) -> Sight {
+        let filters = self.settings.bank.wavevectors().len();
+        Sight {
+            responses: Responses::zeros(filters, self.height, self.width),
+            visible: vec![0.0; self.height * self.width],
+            constraints: vec![0.0; filters * TERMS * self.height * self.width],
+            scratch: Vec::new(),
         }
+    }
+
+    /// Warps a frame by `flow`, filters it and weighs its pixels.
+    pub(super) fn look(
+        &self,
+        target: &Target<'_>,
+        flow: &FlowField<f32>,
+        sight: &mut Sight,
+        control: &Control,
+    ) -> Result<()> {
+        let Frame { offset, picture, ref coverage } = *target.frame;
+        let scaled;
+        let along = if offset == 1.0 {
+            flow
+        } else {
+            scaled = FlowField { u: &flow.u * offset, v: &flow.v * offset };
+            &scaled
+        };
+        let mut warped = target.image.warp(along.view(), control)?;
+        keep_what_rests(&mut warped, picture, along);
+        see(along, coverage.as_ref(), &mut sight.visible);
+        if let Some(coverage) = self.coverage {
+            sight.visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
+        }
+        self.settings.bank.respond_into(
+            warped.view(),
+            Border::Reflect,
+            &mut sight.responses,
+            &mut sight.scratch,
+            control,
+        )
+    }
+
+    /// Looks at a frame and constrains the increment of `flow`.
+    pub(super) fn constrain(
+        &self,
+        target: &Target<'_>,
+        flow: &FlowField<f32>,
+        sight: &mut Sight,
+        control: &Control,
+    ) -> Result<()> {
+        self.look(target, flow, sight, control)?;
+        let (bank, offset) = (&self.settings.bank, target.frame.offset);
+        let Sight { responses, visible, constraints, .. } = sight;
+        let pair = [&self.reference, &*responses];
+        constrain(bank, pair, visible, offset, self.weighting, constraints, control)
+    }
+
+    /// What rests between the reference and the next frame; see [`super::still`].
+    pub(super) fn look_for_rest(
+        &self,
+        sight: &mut Sight,
+        control: &Control,
+    ) -> Result<Option<Rest>> {
+        let next = self.others.iter().find(|target| target.frame.offset == 1.0);
+        let Some(target) = next.filter(|_| self.settings.still) else { return Ok(None) };
         let zero = Array2::zeros((self.height, self.width));
-        let at_rest = FlowField { u: zero.clone(), v: zero };
-        let near = self.others.iter().find(|target| target.frame.offset == 1.0);
-        let Some(target) = near else { return Ok(None) };
-        let (responses, visible) = self.look(target, &at_rest, control)?;
-        let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
-        let mut constraints = self.no_constraints();
-        constrain(bank, pair, &visible, 1.0, self.weighting, &mut constraints, control)?;
-        let (floor, k0) = (self.weighting.floor, wavenumber(bank));
-        look_for_rest(pair, &constraints, floor, k0, self.zoom, control).map(Some)
+        self.constrain(target, &FlowField { u: zero.clone(), v: zero }, sight, control)?;
+        let pair = [&self.reference, &sight.responses];
+        let (floor, k0) = (self.weighting.floor, wavenumber(&self.settings.bank));
+        look_for_rest(pair, &sight.constraints, floor, k0, self.zoom, control).map(Some)
     }
 
     /// How badly `flow` explains the only other frame; see [`super::choice`].
     pub(super) fn mismatch(&self, flow: &FlowField<f32>, control: &Control) -> Result<Mismatch> {
-        let mut constraints = self.no_constraints();
-        let (responses, visible) = self.look(&self.others[0], flow, control)?;
-        let (pair, bank) = ([&self.reference, &responses], &self.settings.bank);
-        let (out, offset) = (&mut constraints, self.others[0].frame.offset);
-        constrain(bank, pair, &visible, offset, self.weighting, out, control)?;
+        let mut sight = self.sight();
+        self.constrain(&self.others[0], flow, &mut sight, control)?;
         let seen = Explanation {
-            responses: pair,
-            visible: &visible,
-            constraints: out,
+            responses: [&self.reference, &sight.responses],
+            visible: &sight.visible,
+            constraints: &sight.constraints,
             floor: self.weighting.floor,
             scale: self.scale(),
             residual: self.settings.residual,
@@ -145,57 +208,28 @@ impl<'a> Level<'a> {
         mismatch(&seen, control)
     }
 
-    /// Room for the constraints of one frame, (H, N, 4, W).
-    pub(super) fn no_constraints(&self) -> Vec<f32> {
-        vec![0.0; self.settings.bank.wavevectors().len() * TERMS * self.height * self.width]
+    /// Mean coherence of the frames at `flow`; see [`super::evidence`].
+    pub(super) fn coherence(
+        &self,
+        flow: &FlowField<f32>,
+        sight: &mut Sight,
+        control: &Control,
+    ) -> Result<Array2<f32>> {
+        let mut sum = Array2::zeros(flow.dim());
+        let share = 1.0 / self.others.len() as f32;
+        for target in &self.others {
+            self.look(target, flow, sight, control)?;
+            let floor = self.weighting.floor;
+            let pair = [&self.reference, &sight.responses];
+            add_coherence(pair, &sight.visible, floor, share, &mut sum, control)?;
+        }
+        Ok(sum)
     }
 
     /// Factor of the sums over constraints: a trace of about 1 where all count fully.
     pub(super) fn scale(&self) -> f32 {
         let terms = self.settings.bank.wavevectors().len() * self.others.len();
         (1.0 / (wavenumber(&self.settings.bank).powi(2) * terms as f64)) as f32
-    }
-
-    /// Responses to a frame warped by `flow`, and the weights of its pixels.
-    pub(super) fn look(
-        &self,
-        target: &Target<'_>,
-        flow: &FlowField<f32>,
-        control: &Control,
-    ) -> Result<(Responses<f32>, Vec<f32>)> {
-        let Frame { offset, picture, ref coverage } = *target.frame;
-        let along = FlowField { u: &flow.u * offset, v: &flow.v * offset };
-        let mut warped = target.image.warp(along.view(), control)?;
-        // The spline passes through the samples but for rounding, which would show as motion of frames at rest.
-        Zip::from(&mut warped).and(picture).and(&along.u).and(&along.v).for_each(
-            |w, &p, &u, &v| {
-                if u == 0.0 && v == 0.0 {
-                    *w = p;
-                }
-            },
-        );
-        let mut visible = visible(along.view(), coverage.as_ref());
-        if let Some(coverage) = self.coverage {
-            visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
-        }
-        let responses = self.settings.bank.respond(warped.view(), Border::Reflect, control)?;
-        Ok((responses, visible))
-    }
-
-    /// Mean coherence of the frames at `flow`; see [`super::evidence`].
-    pub(super) fn coherence(
-        &self,
-        flow: &FlowField<f32>,
-        control: &Control,
-    ) -> Result<Array2<f32>> {
-        let mut sum = Array2::zeros(flow.dim());
-        let share = 1.0 / self.others.len() as f32;
-        for target in &self.others {
-            let (responses, visible) = self.look(target, flow, control)?;
-            let floor = self.weighting.floor;
-            add_coherence(&self.reference, &responses, &visible, floor, share, &mut sum);
-        }
-        Ok(sum)
     }
 }
 
@@ -217,21 +251,30 @@ fn mean_power(responses: &Responses<f32>) -> f64 {
     sum / (filters * height * width) as f64
 }
 
-/// 0 where the flow ends outside the picture, else the frame's coverage there (1 without).
-fn visible(flow: FlowView<'_, f32>, coverage: Option<&Array2<f32>>) -> Vec<f32> {
+/// Puts the sample itself where nothing moves: the spline passes through it but for rounding, which
+/// would show as motion of frames at rest.
+fn keep_what_rests(warped: &mut Array2<f32>, picture: &Array2<f32>, flow: &FlowField<f32>) {
+    let moves = flow.u.iter().zip(&flow.v).map(|(u, v)| u.abs() + v.abs());
+    for ((warped, &sample), motion) in warped.iter_mut().zip(picture).zip(moves) {
+        *warped = if motion == 0.0 { sample } else { *warped };
+    }
+}
+
+/// Weights: 0 where the flow ends outside the picture, else the frame's coverage there (1 without).
+fn see(flow: &FlowField<f32>, coverage: Option<&Array2<f32>>, visible: &mut [f32]) {
     let (height, width) = flow.dim();
     let (right, bottom) = ((width - 1) as f32, (height - 1) as f32);
-    let mut out = Vec::with_capacity(height * width);
-    for (y, (row_u, row_v)) in flow.u.rows().into_iter().zip(flow.v.rows()).enumerate() {
-        for (x, (u, v)) in row_u.iter().zip(row_v).enumerate() {
+    let rows = flow.u.rows().into_iter().zip(flow.v.rows());
+    for (y, ((u, v), out)) in rows.zip(visible.chunks_exact_mut(width)).enumerate() {
+        for (x, ((u, v), out)) in u.iter().zip(v).zip(out).enumerate() {
             let (to_x, to_y) = (x as f32 + u, y as f32 + v);
             let inside = (0.0..=right).contains(&to_x) && (0.0..=bottom).contains(&to_y);
-            out.push(match coverage {
-                _ if !inside => 0.0,
-                Some(weights) => weights[(to_y.round() as usize, to_x.round() as usize)],
-                None => 1.0,
-            });
+            *out = if inside { 1.0 } else { 0.0 };
+            if let Some(weights) = coverage
+                && inside
+            {
+                *out = weights[(to_y.round() as usize, to_x.round() as usize)];
+            }
         }
     }
-    out
 }

@@ -21,8 +21,7 @@ use ndarray::Array2;
 use super::boundary::boundaries;
 use super::data_term::{NormalEquations, Reweighting, accumulate};
 use super::diffusivity::diffusivities;
-use super::level::{Level, Settings};
-use super::phase_constraint::constrain;
+use super::level::{Level, Settings, Sight};
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -47,11 +46,14 @@ pub(super) struct Refined {
 
 impl Level<'_> {
     /// The flow after `warps` warps from `flow`, pulled towards rest by `springs`.
+    ///
+    /// `sights` are memory, one for each other frame.
     pub(super) fn refine(
         &self,
         mut flow: FlowField<f32>,
         warps: usize,
         springs: Option<Array2<f32>>,
+        sights: &mut [Sight],
         control: &Control,
     ) -> Result<Refined> {
         let mut work = Work::new(self);
@@ -59,13 +61,10 @@ impl Level<'_> {
             work.springs = springs.into_raw_vec_and_offset().0;
         }
         for _ in 0..warps {
-            for (target, out) in self.others.iter().zip(&mut work.constraints) {
-                let (responses, visible) = self.look(target, &flow, control)?;
-                let pair = [&self.reference, &responses];
-                let (bank, offset) = (&self.settings.bank, target.frame.offset);
-                constrain(bank, pair, &visible, offset, self.weighting, out, control)?;
+            for (target, sight) in self.others.iter().zip(&mut *sights) {
+                self.constrain(target, &flow, sight, control)?;
             }
-            self.minimise(&mut flow, &mut work, control)?;
+            self.minimise(&mut flow, sights, &mut work, control)?;
             control.advance()?;
         }
         let Work { equations: NormalEquations { a11, a22, .. }, .. } = work;
@@ -80,6 +79,7 @@ impl Level<'_> {
     fn minimise(
         &self,
         flow: &mut FlowField<f32>,
+        sights: &[Sight],
         work: &mut Work,
         control: &Control,
     ) -> Result<()> {
@@ -88,10 +88,11 @@ impl Level<'_> {
         let [start_u, start_v] =
             [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
         let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
+        let constraints: Vec<&[f32]> = sights.iter().map(|sight| &sight.constraints[..]).collect();
         let edges = [&self.edges[0][..], &self.edges[1][..]];
         for _ in 0..passes {
             accumulate(
-                &work.constraints,
+                &constraints,
                 [&u, &v],
                 [start_u, start_v],
                 self.width,
@@ -159,8 +160,6 @@ impl Level<'_> {
 
 /// Memory of the refinement of one level.
 struct Work {
-    /// Constraints of each frame, (H, N, 4, W).
-    constraints: Vec<Vec<f32>>,
     equations: NormalEquations,
     /// Pull towards rest, added to the diagonal; see [`super::still`].
     springs: Vec<f32>,
@@ -173,7 +172,6 @@ impl Work {
     fn new(level: &Level<'_>) -> Self {
         let samples = level.height * level.width;
         Self {
-            constraints: level.others.iter().map(|_| level.no_constraints()).collect(),
             equations: NormalEquations::zeros(samples),
             springs: vec![0.0; samples],
             gx: vec![0.0; samples],

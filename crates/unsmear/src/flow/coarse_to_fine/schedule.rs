@@ -59,17 +59,19 @@ impl Climb<'_> {
             self.at(level, others, control, |prepared| {
                 let start = FlowField { u: flow.u.clone(), v: flow.v.clone() };
                 let mut springs = None;
-                if let Some(rest) = prepared.look_for_rest(control)? {
+                let mut sights: Vec<_> = others.iter().map(|_| prepared.sight()).collect();
+                if let Some(rest) = prepared.look_for_rest(&mut sights[0], control)? {
                     springs = Some(spring(&rest, prepared.zoom, &resting, control)?);
                     resting.push((prepared.zoom, rest.rest));
                 }
-                let refined = prepared.refine(start, self.warps[level], springs, control)?;
+                let refined =
+                    prepared.refine(start, self.warps[level], springs, &mut sights, control)?;
                 flow = refined.flow;
                 if level == self.finest || self.sizes[0].0 <= FARTHEST_EVIDENCE * size.0 {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
                 }
                 if level == self.finest {
-                    let coherence = prepared.coherence(&flow, control)?;
+                    let coherence = prepared.coherence(&flow, &mut sights[0], control)?;
                     trust = Some(confidence(&coherence, &flow, control)?);
                 }
                 Ok(())
