@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear._progress import ProgressBar
-from unsmear._velocity import velocity_of_frame
 from unsmear.cli import _common
 from unsmear.deblur import METHODS, deblur
 from unsmear.flow_files import read_flow
 from unsmear.sequences import write_frames
+from unsmear.velocity import velocity_of_frame
 
 if TYPE_CHECKING:
     import argparse

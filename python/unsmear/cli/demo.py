@@ -12,13 +12,13 @@ import numpy as np
 from unsmear import metrics, plot
 from unsmear._atomic import write_bytes_atomic
 from unsmear._progress import ProgressBar
-from unsmear._velocity import velocity_of_frame
 from unsmear.cli import _common
 from unsmear.deblur import deblur
 from unsmear.demo_clip import DemoClip, demo_clip
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.images import write_image
 from unsmear.sequences import write_frames
+from unsmear.velocity import velocity_of_frame
 
 if TYPE_CHECKING:
     import argparse

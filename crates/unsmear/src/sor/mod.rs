@@ -49,8 +49,8 @@ pub struct SorScratch {
 /// Runs `sweeps` sweeps with relaxation `omega` on (`u`, `v`) in place; see the [module](self).
 ///
 /// # Errors
-/// [`Error::Shape`] when a slice has not height x width samples; [`Error::Value`] for omega outside (0, 2);
-/// [`Error::Cancelled`], after which (`u`, `v`) are as before.
+/// [`Error::Shape`](crate::Error::Shape) when a slice has not height x width samples; [`Error::Value`](crate::Error::Value) for omega outside (0, 2);
+/// [`Error::Cancelled`](crate::Error::Cancelled), after which (`u`, `v`) are as before.
 pub fn solve(
     system: &SorSystem<'_>,
     u: &mut [f32],

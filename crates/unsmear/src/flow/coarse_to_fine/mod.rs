@@ -1,7 +1,7 @@
 //! Coarse-to-fine phase-based flow: the default method.
 //!
 //! From the coarsest level of a pyramid to the finest, the flow found so far is enlarged and refined
-//! by warping ([`refine`]). At every level one bank of four Gabor filters of wavelength 4 px and 1.6
+//! by warping (`refine`). At every level one bank of four Gabor filters of wavelength 4 px and 1.6
 //! octaves sees what the level adds: half an octave of detail, moving by less than half a wavelength
 //! against what is known already. Phase differences do not change with brightness and contrast.
 //!

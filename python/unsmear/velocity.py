@@ -21,15 +21,36 @@ from unsmear.flow import FlowResult, optical_flow
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+__all__ = ["velocity_of_frame"]
+
 _FORWARD_METHODS = ("fast", "balanced", "accurate")
 
 
 def velocity_of_frame(
     frames: NDArray[Any], index: int, *, method: str = "balanced", **options: Any
 ) -> tuple[NDArray[np.float32], FlowResult]:
-    """Return the velocity (H, W, 2) of frame ``index`` and the flow it comes from.
+    """Measure the velocity that blurs one frame.
 
-    The flow is that to the next frame, or for the last frame that to the one before.
+    Parameters
+    ----------
+    frames : ndarray of shape (T, H, W), or colour with ``channel_axis`` in ``options``
+        At least 2, time first.
+    index : int
+        The frame, counted from the start.
+    method : str, default "balanced"
+        A flow method; see `unsmear.optical_flow`, which takes ``options`` too.
+
+    Returns
+    -------
+    velocity : ndarray of shape (H, W, 2), float32
+        px/frame; NaN where nothing is known.
+    result : FlowResult
+        The flow it comes from: to the next frame, or from the last one back.
+
+    Raises
+    ------
+    ValueError
+        Fewer than 2 frames, or what `unsmear.optical_flow` raises.
     """
     count = len(frames)
     if count < 2:
