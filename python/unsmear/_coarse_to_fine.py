@@ -33,8 +33,10 @@ def estimate(
     values: dict[str, Any],
     progress: Steps | None,
     method: str,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], list[int], int]:
-    """Return flow, confidence, the shape (T, H, W) and the reference frame.
+) -> tuple[
+    NDArray[np.float32], NDArray[np.float32], list[int], int, list[dict[str, Any]]
+]:
+    """Return flow, confidence, shape (T, H, W), reference frame and levels' records.
 
     Only the frames that the method looks at are converted; ``index`` turns the number
     of frames into the reference.
@@ -71,7 +73,7 @@ def estimate(
         colour = used[reference - first]
         guide = np.ascontiguousarray(np.moveaxis(colour, -1, 0))
         used = np.ascontiguousarray(luma(used))
-    flow, confidence = _unsmear.coarse_to_fine(
+    flow, confidence, levels = _unsmear.coarse_to_fine(
         used,
         reference - first,
         values,
@@ -79,7 +81,9 @@ def estimate(
         mask=None if mask is None else _as_mask(mask, (height, width)),
         progress=progress,
     )
-    return flow, confidence, [count, height, width], reference
+    names = ("frames", "height", "width", "changes", "evidence", "rest")
+    records = [dict(zip(names, level, strict=True)) for level in levels]
+    return flow, confidence, [count, height, width], reference, records
 
 
 def _as_mask(mask: ArrayLike, shape: tuple[int, int]) -> NDArray[np.bool_]:

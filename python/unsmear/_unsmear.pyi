@@ -75,7 +75,7 @@ def coarse_to_fine(
     guide: _Double | None = None,
     mask: NDArray[np.bool_] | None = None,
     progress: _Progress | None = None,
-) -> tuple[_Single, _Single]: ...
+) -> tuple[_Single, _Single, list[tuple[int, int, int, list[float], float, float]]]: ...
 @overload
 def least_squares(
     frames: _Double,

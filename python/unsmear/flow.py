@@ -153,7 +153,9 @@ def optical_flow(
     Returns
     -------
     FlowResult
-        ``flow``, ``confidence``, ``valid`` and ``report``.
+        ``flow``, ``confidence``, ``valid`` and ``report``, whose ``levels`` tell, for
+        the coarse-to-fine methods, what happened at each level from the coarsest: size,
+        mean change by each warp (px of the level), mean evidence and pull to rest.
 
     Raises
     ------
@@ -183,7 +185,7 @@ def optical_flow(
     values = merged(method, parameters)
     started = time.perf_counter()
     if method in _COARSE_TO_FINE:
-        flow, confidence, shape, reference = _coarse_to_fine.estimate(
+        flow, confidence, shape, reference, levels = _coarse_to_fine.estimate(
             frames,
             channel_axis,
             lambda count: reference_frame(index, count),
@@ -207,7 +209,7 @@ def optical_flow(
             raise ValueError(msg)
         reference = reference_frame(index, grey.shape[0])
         flow, confidence = _run(method, grey, reference, values, progress)
-        shape = list(grey.shape)
+        shape, levels = list(grey.shape), []
     valid = np.asarray(~np.isnan(flow).any(axis=-1))
     return FlowResult(
         flow=flow,
@@ -222,6 +224,7 @@ def optical_flow(
             "seconds": time.perf_counter() - started,
             "threads": _unsmear.get_num_threads(),
             "version": _unsmear.__version__,
+            "levels": levels,
             "warnings": [] if valid.any() else ["nothing to measure motion on"],
         },
     )

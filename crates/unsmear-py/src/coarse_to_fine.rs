@@ -33,7 +33,10 @@ pub(crate) struct Items {
     choose_frames: bool,
 }
 
-/// Flow (H, W, 2) and confidence (H, W) of frames (T, H, W) at `index`.
+/// A level's record: frames, height, width, changes, evidence, rest.
+type Level = (usize, usize, usize, Vec<f64>, f64, f64);
+
+/// Flow (H, W, 2) and confidence (H, W) of frames (T, H, W) at `index`, and the records of the levels.
 #[pyfunction]
 #[pyo3(signature = (frames, index, parameters, *, guide=None, mask=None, progress=None))]
 pub(crate) fn coarse_to_fine(
@@ -44,7 +47,7 @@ pub(crate) fn coarse_to_fine(
     guide: Option<PyReadonlyArray3<'_, f64>>,
     mask: Option<PyReadonlyArray2<'_, bool>>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
+) -> PyResult<(Py<PyAny>, Py<PyAny>, Vec<Level>)> {
     let Items { pyramid_factor, coarsest_side, finest_level, .. } = parameters;
     let method = CoarseToFine {
         pyramid_factor,
@@ -74,7 +77,12 @@ pub(crate) fn coarse_to_fine(
         guide: guide.as_ref().map(PyReadonlyArray3::as_array),
         mask: mask.as_ref().map(PyReadonlyArray2::as_array),
     };
-    let estimate = run(py, progress, |control| method.estimate(&sequence, control))?;
+    let (estimate, levels) = run(py, progress, |control| method.trace(&sequence, control))?;
     let flow = flow_to_python(py, estimate.flow).into_any().unbind();
-    Ok((flow, picture_to_python(py, estimate.confidence).into_any().unbind()))
+    let levels = levels.into_iter().map(|level| {
+        let (height, width) = level.size;
+        (level.frames, height, width, level.changes, level.evidence, level.rest)
+    });
+    let confidence = picture_to_python(py, estimate.confidence).into_any().unbind();
+    Ok((flow, confidence, levels.collect()))
 }

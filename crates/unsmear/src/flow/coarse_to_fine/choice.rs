@@ -153,3 +153,59 @@ pub(super) fn merge(
     let flow = FlowField { u: pick(two.0.u, &several.0.u), v: pick(two.0.v, &several.0.v) };
     (flow, pick(two.1, &several.1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(map: [f32; 3], weight: [f32; 3], bias: f64) -> Mismatch {
+        let plane = |values: [f32; 3]| Array2::from_shape_fn((1, 3), |(_, x)| values[x]);
+        Mismatch { map: plane(map), weight: plane(weight), bias }
+    }
+
+    #[test]
+    fn several_frames_hold_where_they_explain_the_next() {
+        let two = judged([0.10, 0.10, 0.10], [4.0; 3], 0.0);
+        let fine = judged([0.05, 0.05, 0.24], [4.0; 3], 0.03);
+        assert_eq!(several_hold(&two, &fine).into_raw_vec_and_offset().0, [true, true, false]);
+        let out_of_view = judged([0.05, 0.05, 0.24], [4.0, 4.0, 1.0], 0.03);
+        assert!(several_hold(&two, &out_of_view).iter().all(|&hold| hold));
+    }
+
+    #[test]
+    fn several_frames_are_given_up_as_a_whole() {
+        let two = judged([0.10; 3], [4.0; 3], 0.0);
+        let worse = judged([0.12; 3], [4.0; 3], 0.0);
+        let biased = judged([0.05; 3], [4.0, 4.0, 1.0], 0.05);
+        for several in [worse, biased] {
+            assert!(several_hold(&two, &several).iter().all(|&hold| !hold));
+        }
+    }
+
+    /// One filter along x and one along y, of 1 rad/px each.
+    #[test]
+    fn bias_is_the_motion_that_the_constraints_still_ask_for() {
+        let mut responses = Responses::zeros(2, 30, 30);
+        for (y, j) in (0..30).flat_map(|y| [(y, 0), (y, 1)]) {
+            responses.row_mut(j, y).0.fill(5.0);
+        }
+        let mut constraints = Vec::new();
+        for _ in 0..30 {
+            for terms in [[1.0, 0.0, 0.03, 1.0], [0.0, 1.0, -0.04, 1.0]] {
+                constraints.extend(terms.into_iter().flat_map(|term| [term; 30]));
+            }
+        }
+        let seen = Explanation {
+            responses: [&responses, &responses],
+            visible: &[1.0; 900],
+            constraints: &constraints,
+            floor: 0.1,
+            scale: 1.0,
+            residual: 0.5,
+        };
+        let found = mismatch(&seen, &Control::new()).unwrap();
+        // 0.05 px but for the 1 % of the floor and the reweighting's 0.6 %.
+        assert!((found.bias - 0.05).abs() < 1e-3, "{}", found.bias);
+        assert!(found.map.iter().all(|&e| e == 0.0), "equal responses agree");
+    }
+}

@@ -171,6 +171,38 @@ mod tests {
         }
     }
 
+    /// `A U - c` is the gradient of the robust energy, by central differences of it.
+    #[test]
+    fn the_equations_are_the_gradient_of_the_energy() {
+        let constraints = [[1.2f32, -0.4, 0.3, 0.8], [0.1, 1.5, -1.1, 0.5], [-0.9, 1.0, 2.5, 1.0]];
+        let (start, flow) = ([0.3f32, 0.1], [0.9f32, -0.4]);
+        let energy = |at: [f64; 2]| -> f64 {
+            let along = |g: f32, i: usize| f64::from(g) * (at[i] - f64::from(start[i]));
+            let term = |[gx, gy, d, w]: [f32; 4]| {
+                let r = (along(gx, 0) + along(gy, 1) + f64::from(d)) / 0.6;
+                0.7 * 0.5 * 0.36 * f64::from(w) * (1.0 + r * r).ln()
+            };
+            constraints.into_iter().map(term).sum()
+        };
+        let reweighting = Reweighting { residual: 0.6, scale: 0.7 };
+        let (terms, mut e) = (constraints.concat(), NormalEquations::zeros(1));
+        let (u, v, u0, v0) = ([flow[0]], [flow[1]], [start[0]], [start[1]]);
+        let control = Control::new();
+        accumulate(&[&terms], [&u, &v], [&u0, &v0], 1, reweighting, &mut e, &control).unwrap();
+        let (h, [u, v]) = (1e-5, flow.map(f64::from));
+        let numeric = [
+            (energy([u + h, v]) - energy([u - h, v])) / (2.0 * h),
+            (energy([u, v + h]) - energy([u, v - h])) / (2.0 * h),
+        ];
+        let found = [
+            e.a11[0] * flow[0] + e.a12[0] * flow[1] - e.c1[0],
+            e.a12[0] * flow[0] + e.a22[0] * flow[1] - e.c2[0],
+        ];
+        // Single precision sums of terms of order one.
+        assert!((numeric[0] - f64::from(found[0])).abs() < 1e-6);
+        assert!((numeric[1] - f64::from(found[1])).abs() < 1e-6);
+    }
+
     #[test]
     fn a_residual_of_the_scale_halves_the_weight() {
         let terms = [1.0, 0.0, 0.5, 1.0];

@@ -123,3 +123,51 @@ pub(super) fn gather(
     let coarser = resample(coarser.view(), here.dim(), Resampling::Linear, control)?;
     Ok(Zip::from(&here).and(&coarser).map_collect(|a, b| a.max(*b)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn responses(value: f32) -> Responses<f32> {
+        let mut responses = Responses::zeros(2, 24, 24);
+        for (y, j) in (0..24).flat_map(|y| [(y, 0), (y, 1)]) {
+            responses.row_mut(j, y).1.fill(value);
+        }
+        responses
+    }
+
+    fn coherence(one: f32, other: f32) -> Array2<f32> {
+        let mut sum = Array2::zeros((24, 24));
+        let pair = [&responses(one), &responses(other)];
+        add_coherence(pair, &[1.0; 576], 2.0, 1.0, &mut sum, &Control::new()).unwrap();
+        sum
+    }
+
+    #[test]
+    fn equal_responses_are_coherent_and_opposite_ones_are_not() {
+        // Two filters of amplitude 3: 18/(18 + 2).
+        assert!(coherence(3.0, 3.0).iter().all(|c| (c - 0.9).abs() < 1e-6));
+        assert!(coherence(3.0, -3.0).iter().all(|c| (c + 0.9).abs() < 1e-6));
+        let flow = FlowField { u: Array2::zeros((24, 24)), v: Array2::zeros((24, 24)) };
+        let trust = |c: Array2<f32>| confidence(&c, &flow, &Control::new()).unwrap()[(12, 12)];
+        assert!((trust(coherence(3.0, 3.0)) - 0.9).abs() < 1e-5);
+        assert_eq!(trust(coherence(3.0, -3.0)), 0.0);
+    }
+
+    #[test]
+    fn confidence_falls_where_the_flow_changes() {
+        let u = Array2::from_shape_fn((24, 24), |(_, x)| 0.3 * x as f32);
+        let v = Array2::from_shape_fn((24, 24), |(y, _)| 0.4 * y as f32);
+        let sheared = FlowField { u, v };
+        let trust = confidence(&Array2::ones((24, 24)), &sheared, &Control::new()).unwrap();
+        // |grad| = 0.5 everywhere: exp(-1).
+        assert!(trust.iter().all(|c| (c - (-1.0f32).exp()).abs() < 1e-4));
+    }
+
+    #[test]
+    fn evidence_of_any_level_counts() {
+        let coarse = Array2::from_shape_fn((6, 6), |(_, x)| if x < 3 { 1.0 } else { 0.0 });
+        let both = gather(Some(coarse), &Array2::zeros((12, 12)), &Control::new()).unwrap();
+        assert_eq!((both[(6, 0)], both[(6, 11)]), (1.0, 0.0));
+    }
+}

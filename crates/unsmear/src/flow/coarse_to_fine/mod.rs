@@ -43,6 +43,7 @@ mod still;
 
 pub use frames::Sequence;
 pub use parameters::CoarseToFine;
+pub use schedule::LevelTrace;
 
 use choice::{merge, several_hold};
 use contrast::Contrast;
@@ -66,13 +67,26 @@ impl CoarseToFine {
     /// [`Error::Value`](crate::Error::Value) for a parameter out of range or an index without a next frame,
     /// [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn estimate(&self, sequence: &Sequence<'_>, control: &Control) -> Result<Estimate<f32>> {
+        self.trace(sequence, control).map(|(estimate, _)| estimate)
+    }
+
+    /// Like [`CoarseToFine::estimate`], with what happened at each level, coarsest first.
+    ///
+    /// # Errors
+    /// As [`CoarseToFine::estimate`].
+    pub fn trace(
+        &self,
+        sequence: &Sequence<'_>,
+        control: &Control,
+    ) -> Result<(Estimate<f32>, Vec<LevelTrace>)> {
         let mut settings = self.settings()?;
         let (count, height, width) = sequence.check()?;
         let sizes = level_sizes((height, width), self.pyramid_factor, self.coarsest_side);
         let contrast = Contrast::measure(sequence.frames);
         if contrast.is_blank() {
             let confidence = Array2::zeros((height, width));
-            return Ok(Estimate { flow: FlowField::unknown((height, width)), confidence });
+            let flow = FlowField::unknown((height, width));
+            return Ok((Estimate { flow, confidence }, Vec::new()));
         }
         let plan = Plan { sequence, contrast, sizes: &sizes, factor: self.pyramid_factor };
         let reference = plan.frame(0.0, sequence.index, control)?;
@@ -102,7 +116,7 @@ impl CoarseToFine {
             control.expect(climb.steps());
             climb.run(&others, control)?
         };
-        descend(summit, (height, width), control)
+        Ok((descend(&summit, (height, width), control)?, summit.levels))
     }
 
     /// Offsets to the other frames, and their indices.
@@ -173,11 +187,12 @@ fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Res
     })?;
     let (flow, confidence) =
         merge(&hold, (two.flow, two.confidence), (several.flow, several.confidence));
-    Ok(Summit { flow, confidence, evidence: several.evidence })
+    let levels = [two.levels, several.levels].concat();
+    Ok(Summit { flow, confidence, evidence: several.evidence, levels })
 }
 
 /// The result at the size of the frames: unknown, with confidence 0, where there is no evidence.
-fn descend(summit: Summit, size: (usize, usize), control: &Control) -> Result<Estimate<f32>> {
+fn descend(summit: &Summit, size: (usize, usize), control: &Control) -> Result<Estimate<f32>> {
     let larger = |plane: &Array2<f32>| resample(plane.view(), size, Resampling::Linear, control);
     let mut flow = enlarge(&summit.flow, size, control)?;
     let mut confidence = larger(&summit.confidence)?;

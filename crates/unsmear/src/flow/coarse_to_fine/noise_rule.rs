@@ -43,3 +43,32 @@ pub(super) fn adapt(
     settings.edges.sigma += 0.08 * s.min(2.0 * KNEE);
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::coarse_to_fine::CoarseToFine;
+
+    /// Alpha after noise of deviation `sigma`: sums of 12 uniform numbers are nearly normal.
+    fn alpha(sigma: f32) -> f32 {
+        let mut state = 1u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0
+        };
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+        let picture: Vec<f32> = (0..96 * 96).map(|_| sigma * normal()).collect();
+        let mut settings = CoarseToFine::balanced().settings().unwrap();
+        adapt(&mut settings, &picture, (96, 96), &Control::new()).unwrap();
+        settings.alpha
+    }
+
+    #[test]
+    fn noise_smooths_and_its_absence_does_not() {
+        assert_eq!(alpha(0.0), 0.1);
+        assert_eq!(alpha(1.8), 0.1, "photographs read as much");
+        // n = 7 within 10 %: s = sqrt(49 - 5.1)/1.4 = 4.7, alpha = 0.1 (1 + 4.7/4).
+        assert!((alpha(7.0) - 0.218).abs() < 0.025, "{}", alpha(7.0));
+        assert!(alpha(20.0) > alpha(10.0));
+    }
+}

@@ -212,3 +212,80 @@ fn constraint(filter: &Filter, one: &Cross, other: &Cross) -> [f32; TERMS] {
         select(weight),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gabor::GaborParameters;
+
+    fn bank() -> GaborBank<f32> {
+        GaborBank::new(&GaborParameters {
+            tuning_frequency: 0.25,
+            bandwidth_octaves: 1.6,
+            orientations: 4,
+            support: 2.2,
+        })
+        .unwrap()
+    }
+
+    /// Each filter's own wave, ahead by `phase`.
+    fn waves(
+        bank: &GaborBank<f32>,
+        (height, width): (usize, usize),
+        amplitude: f64,
+        phase: f64,
+    ) -> Responses<f32> {
+        let mut responses = Responses::zeros(4, height, width);
+        for (j, &[kx, ky]) in bank.wavevectors().iter().enumerate() {
+            for y in 0..height {
+                let (re, im) = responses.row_mut(j, y);
+                for x in 0..width {
+                    let angle = kx * x as f64 + ky * y as f64 + phase;
+                    re[x] = (amplitude * angle.cos()) as f32;
+                    im[x] = (amplitude * angle.sin()) as f32;
+                }
+            }
+        }
+        responses
+    }
+
+    /// `G = k_j`, `D` the phase and `W = w A/(A + r^2) q^2`, at the edges too; without a neighbour along an axis the
+    /// derivative reads the tuned frequency, which here is the truth.
+    #[test]
+    fn terms_of_plane_waves_are_exact_up_to_the_edge() {
+        let (bank, control) = (bank(), Control::new());
+        for shape in [(5, 7), (4, 40), (1, 9), (9, 1), (1, 1), (2, 2)] {
+            let pair = [waves(&bank, shape, 3.0, 0.2), waves(&bank, shape, 6.0, 0.9)];
+            let (height, width) = shape;
+            let mut out = vec![f32::NAN; height * width * 4 * TERMS];
+            let seen = vec![0.5; height * width];
+            let rule = Weighting { floor: 4.5, narrowness: 1.0 };
+            constrain(&bank, [&pair[0], &pair[1]], &seen, 2.0, rule, &mut out, &control).unwrap();
+            // A = 18, q = 36/45.
+            let weight = 0.5 * 18.0 / (18.0 + 4.5) * 0.64;
+            for (row, terms) in out.chunks(TERMS * width).enumerate() {
+                let [kx, ky] = bank.wavevectors()[row % 4];
+                for x in 0..width {
+                    let at = |term: usize| f64::from(terms[term * width + x]);
+                    assert!((at(0) - 2.0 * kx).abs() < 1e-5 && (at(1) - 2.0 * ky).abs() < 1e-5);
+                    assert!((at(2) - 0.7).abs() < 1e-5 && (at(3) - weight).abs() < 1e-5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_has_no_say() {
+        let (bank, control) = (bank(), Control::new());
+        let (good, mut bad) = (waves(&bank, (6, 6), 1.0, 0.0), waves(&bank, (6, 6), 1.0, 0.0));
+        bad.row_mut(1, 3).0[2] = f32::NAN;
+        let mut out = vec![0.0; 36 * 4 * TERMS];
+        let rule = Weighting { floor: 1.0, narrowness: 1.0 };
+        constrain(&bank, [&good, &bad], &[1.0; 36], 1.0, rule, &mut out, &control).unwrap();
+        assert!(out.iter().all(|term| term.is_finite()));
+        assert_eq!(out[((3 * 4 + 1) * TERMS + 3) * 6 + 2], 0.0);
+        let silent = Responses::zeros(4, 6, 6);
+        constrain(&bank, [&good, &silent], &[1.0; 36], 1.0, rule, &mut out, &control).unwrap();
+        assert!(out.iter().all(|&term| term == 0.0));
+    }
+}

@@ -42,6 +42,8 @@ const MEDIAN_SPREAD: f32 = 0.8;
 pub(super) struct Refined {
     pub(super) flow: FlowField<f32>,
     pub(super) trace: Array2<f32>,
+    /// Mean change of the flow by each warp, px of the level.
+    pub(super) changes: Vec<f64>,
 }
 
 impl Level<'_> {
@@ -60,11 +62,12 @@ impl Level<'_> {
         if let Some(springs) = springs {
             work.springs = springs.into_raw_vec_and_offset().0;
         }
+        let mut changes = Vec::with_capacity(warps);
         for _ in 0..warps {
             for (target, sight) in self.others.iter().zip(&mut *sights) {
                 self.constrain(target, &flow, sight, control)?;
             }
-            self.minimise(&mut flow, sights, &mut work, control)?;
+            changes.push(self.minimise(&mut flow, sights, &mut work, control)?);
             control.advance()?;
         }
         let Work { equations: NormalEquations { a11, a22, .. }, .. } = work;
@@ -72,17 +75,17 @@ impl Level<'_> {
             let i = y * self.width + x;
             a11[i] + a22[i]
         });
-        Ok(Refined { flow: self.sharpen(flow, control)?, trace })
+        Ok(Refined { flow: self.sharpen(flow, control)?, trace, changes })
     }
 
-    /// The minimum of the energy near `flow`, within reach of one warp.
+    /// Moves `flow` to the minimum of the energy within reach of one warp; returns the mean change, px.
     fn minimise(
         &self,
         flow: &mut FlowField<f32>,
         sights: &[Sight],
         work: &mut Work,
         control: &Control,
-    ) -> Result<()> {
+    ) -> Result<f64> {
         let Settings { residual, alpha, passes, sweeps, .. } = *self.settings;
         let scale = self.scale();
         let [start_u, start_v] =
@@ -116,13 +119,16 @@ impl Level<'_> {
             };
             solve(&system, &mut u, &mut v, RELAXATION, sweeps, &mut work.sor, control)?;
         }
+        let mut change = 0.0;
         for (component, start) in [(&mut u, start_u), (&mut v, start_v)] {
             for (new, &old) in component.iter_mut().zip(&*start) {
-                *new = old + (*new - old).clamp(-LARGEST_INCREMENT, LARGEST_INCREMENT);
+                let increment = (*new - old).clamp(-LARGEST_INCREMENT, LARGEST_INCREMENT);
+                change += f64::from(increment.abs());
+                *new = old + increment;
             }
             median_5x5(component, self.height, self.width, start, control)?;
         }
-        Ok(())
+        Ok(change / (self.height * self.width) as f64)
     }
 
     /// The weighted median at motion boundaries.

@@ -33,11 +33,28 @@ pub(super) struct Climb<'a> {
     pub(super) channels: &'a [Vec<Array2<f32>>],
 }
 
+/// What happened at one level, to see where a flow went wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelTrace {
+    /// Frames used besides the reference.
+    pub frames: usize,
+    /// Size of the level, px.
+    pub size: (usize, usize),
+    /// Mean change of `|u| + |v|` by each warp, px of the level: falling, where warping converges.
+    pub changes: Vec<f64>,
+    /// Mean trace of the data term: 1 where every filter has its say, 0 where none has.
+    pub evidence: f64,
+    /// Mean pull towards rest.
+    pub rest: f64,
+}
+
 /// The result at the finest level that was solved.
 pub(super) struct Summit {
     pub(super) flow: FlowField<f32>,
     pub(super) confidence: Array2<f32>,
     pub(super) evidence: Array2<f32>,
+    /// Coarsest level first.
+    pub(super) levels: Vec<LevelTrace>,
 }
 
 impl Climb<'_> {
@@ -53,20 +70,30 @@ impl Climb<'_> {
     pub(super) fn run(&self, others: &[&FramePyramid], control: &Control) -> Result<Summit> {
         let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
         let (mut evidence, mut trust) = (None, None);
-        let mut resting = Vec::new();
+        let (mut resting, mut levels) = (Vec::new(), Vec::new());
         for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
             flow = enlarge(&flow, size, control)?;
             self.at(level, others, control, |prepared| {
+                let mut pull = 0.0;
                 let start = FlowField { u: flow.u.clone(), v: flow.v.clone() };
                 let mut springs = None;
                 let mut sights: Vec<_> = others.iter().map(|_| prepared.sight()).collect();
                 if let Some(rest) = prepared.look_for_rest(&mut sights[0], control)? {
-                    springs = Some(spring(&rest, prepared.zoom, &resting, control)?);
+                    let spring = spring(&rest, prepared.zoom, &resting, control)?;
+                    pull = mean(&spring);
+                    springs = Some(spring);
                     resting.push((prepared.zoom, rest.rest));
                 }
                 let refined =
                     prepared.refine(start, self.warps[level], springs, &mut sights, control)?;
                 flow = refined.flow;
+                levels.push(LevelTrace {
+                    frames: others.len(),
+                    size,
+                    changes: refined.changes,
+                    evidence: mean(&refined.trace),
+                    rest: pull,
+                });
                 if level == self.finest || self.sizes[0].0 <= FARTHEST_EVIDENCE * size.0 {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
                 }
@@ -80,7 +107,7 @@ impl Climb<'_> {
         let nothing = || Array2::zeros(flow.dim());
         let (confidence, evidence) =
             (trust.unwrap_or_else(nothing), evidence.unwrap_or_else(nothing));
-        Ok(Summit { flow, confidence, evidence })
+        Ok(Summit { flow, confidence, evidence, levels })
     }
 
     /// Prepares a level and hands it to `work`.
@@ -102,6 +129,10 @@ impl Climb<'_> {
     }
 }
 
+fn mean(plane: &Array2<f32>) -> f64 {
+    plane.iter().map(|&s| f64::from(s)).sum::<f64>() / plane.len() as f64
+}
+
 /// The flow at another size, motions with it; of no flow, no motion.
 pub(super) fn enlarge(
     flow: &FlowField<f32>,
@@ -120,4 +151,19 @@ pub(super) fn enlarge(
         Ok(resampled * (to as f32 / from as f32))
     };
     Ok(FlowField { u: larger(&flow.u, size.1, width)?, v: larger(&flow.v, size.0, height)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motion_grows_with_the_picture() {
+        let control = Control::new();
+        let [u, v] = [1.0, -2.0].map(|motion| Array2::from_elem((4, 6), motion));
+        let large = enlarge(&FlowField { u, v }, (8, 18), &control).unwrap();
+        assert!(large.u.iter().all(|&u| u == 3.0) && large.v.iter().all(|&v| v == -4.0));
+        let nothing = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
+        assert_eq!(enlarge(&nothing, (2, 3), &control).unwrap().u, Array2::<f32>::zeros((2, 3)));
+    }
 }

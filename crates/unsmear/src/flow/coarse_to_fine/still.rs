@@ -106,3 +106,44 @@ pub(super) fn spring(
     }
     Ok(Zip::from(&here.pattern).and(&least).map_collect(|pattern, rest| STRENGTH * pattern * rest))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One filter that sees a pattern of amplitude 2 everywhere, moved by `step` rad, `G = (1.5, 0)`.
+    fn rest_of(step: f32, zoom: f32) -> Rest {
+        let mut responses = Responses::zeros(1, 20, 20);
+        for y in 0..20 {
+            responses.row_mut(0, y).0.fill(2.0);
+        }
+        let mut constraints = Vec::new();
+        for _ in 0..20 {
+            constraints.extend([1.5, 0.0, step, 1.0].into_iter().flat_map(|term| [term; 20]));
+        }
+        let pair = [&responses, &responses];
+        look_for_rest(pair, &constraints, 0.25, 1.5, zoom, &Control::new()).unwrap()
+    }
+
+    #[test]
+    fn a_pattern_at_rest_is_held_and_a_moving_one_is_not() {
+        let middle = |rest: &Rest| spring(rest, 1.0, &[], &Control::new()).unwrap()[(10, 10)];
+        let still = middle(&rest_of(0.0, 1.0));
+        assert!(still > 0.99 * STRENGTH && still <= STRENGTH);
+        // A tenth of a pixel: rho = 0.01 but for the floor.
+        let slow = middle(&rest_of(0.15, 1.0)) / STRENGTH;
+        assert!((0.6..0.7).contains(&slow), "{slow}");
+        assert!(middle(&rest_of(0.5, 1.0)) < 1e-3);
+        // The same phase at a quarter of the size is four times the speed.
+        assert!(middle(&rest_of(0.15, 4.0)) < 1e-6);
+    }
+
+    #[test]
+    fn a_coarser_level_that_sees_motion_forbids_the_spring() {
+        let fine = rest_of(0.0, 1.0);
+        let seen = Array2::from_elem((10, 10), 0.25);
+        let with = |zoom| spring(&fine, 1.0, &[(zoom, seen.clone())], &Control::new()).unwrap();
+        assert!((with(2.0)[(8, 8)] - 0.25 * STRENGTH).abs() < 1e-3);
+        assert!(with(8.0)[(8, 8)] > 0.99 * STRENGTH, "too far away to tell");
+    }
+}
