@@ -1,14 +1,20 @@
 """Image sequences with exact truth: flow, velocity, visibility, sharp frames.
 
-A scene is a stack of textures (`scene`), each moved by an affine motion given as a
+A `Scene` is a stack of textures (`scene`), each moved by an affine motion given as a
 function of time (`motion`); a sequence is that scene seen at whole times, and exposed
-around them (`sequence`). Because motions are functions of time, flow is exact and a
-blurred frame is a true integral over its exposure.
+around them (`sequence`). A `World` (`ray_caster`) holds solid bodies (`solids`,
+`terrain`) with patterns (`surface`), each with a pose as a function of time (`pose`),
+lit, shadowed and seen by a moving camera; nine of them recreate in kind the scenes of
+the founding work (`thesis_scenes`). Because motions are functions of time, flow is
+exact and a blurred frame is a true integral over its exposure.
 """
 
 from __future__ import annotations
 
+from unsmear.synthetic.lighting import Light, Sky
 from unsmear.synthetic.motion import Motion, rotating, shaking, translating, zooming
+from unsmear.synthetic.pose import looking, placed, turned
+from unsmear.synthetic.ray_caster import Body, Camera, World
 from unsmear.synthetic.scene import Layer, Scene
 from unsmear.synthetic.sequence import (
     Sequence,
@@ -19,14 +25,33 @@ from unsmear.synthetic.sequence import (
     translation,
     zoom,
 )
-from unsmear.synthetic.texture import plane_wave, texture
+from unsmear.synthetic.solids import Box, Disc, Rectangle, Sphere
+from unsmear.synthetic.surface import Surface
+from unsmear.synthetic.terrain import Terrain
+from unsmear.synthetic.texture import checkers, plane_wave, texture
+from unsmear.synthetic.thesis_scenes import THESIS_SCENES, thesis_scene
 
 __all__ = [
+    "THESIS_SCENES",
+    "Body",
+    "Box",
+    "Camera",
+    "Disc",
     "Layer",
+    "Light",
     "Motion",
+    "Rectangle",
     "Scene",
     "Sequence",
+    "Sky",
+    "Sphere",
+    "Surface",
+    "Terrain",
+    "World",
+    "checkers",
     "layers",
+    "looking",
+    "placed",
     "plane_wave",
     "record",
     "rotating",
@@ -34,8 +59,10 @@ __all__ = [
     "shake",
     "shaking",
     "texture",
+    "thesis_scene",
     "translating",
     "translation",
+    "turned",
     "zoom",
     "zooming",
 ]

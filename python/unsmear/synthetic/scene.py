@@ -175,3 +175,9 @@ class Scene:
         limit = np.array(self.shape[::-1]) / 2.0
         inside = np.asarray((np.abs(landed) <= limit).all(axis=-1))
         return moved, inside & (self.front(end, landed) == front)
+
+    def velocity(self, time: float, step: float) -> NDArray[np.float64]:
+        """Return the central difference of positions over ``2 step``, (H, W, 2)."""
+        ahead, _ = self.displacement(time, time + step)
+        back, _ = self.displacement(time, time - step)
+        return (ahead - back) / (2 * step)

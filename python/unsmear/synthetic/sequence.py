@@ -8,7 +8,7 @@ sharp pictures at the midpoints of equal parts of ``t - e/2 .. t + e/2``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -21,8 +21,23 @@ if TYPE_CHECKING:
 __all__ = ["Sequence", "layers", "record", "rotation", "shake", "translation", "zoom"]
 
 _GREY_LEVELS = 255.0
-# Half step of the central difference for velocities: error of order step^2.
+# Half step of the central difference for velocities, frames: error of order step^2.
 _VELOCITY_STEP = 1e-4
+
+
+class Recordable(Protocol):
+    """What a scene must tell to be recorded: `Scene` and `World` do."""
+
+    def render(self, time: float) -> NDArray[np.float64]:
+        """Return the picture at ``time``, (H, W) or (H, W, C)."""
+
+    def displacement(
+        self, start: float, end: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the motion (H, W, 2) of what is seen, and whether it stays visible."""
+
+    def velocity(self, time: float, step: float) -> NDArray[np.float64]:
+        """Return the velocity (H, W, 2) by a central difference over ``2 step``."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +51,8 @@ class Sequence:
         ``bits=8`` was asked for. With exposure 0 the blurred frames are the sharp ones
         plus noise.
     flow : ndarray of shape (T, H, W, 2), float32
-        Exact motion from each frame's time to one frame later, px.
+        Exact motion from each frame's time to one frame later, px; NaN for what is
+        behind the camera by then.
     velocity : ndarray of shape (T, H, W, 2), float32
         Exact velocity at the middle of each exposure, px/frame: what blurs.
     visible : ndarray of shape (T, H, W), bool
@@ -54,7 +70,7 @@ class Sequence:
 
 
 def record(
-    scene: Scene,
+    scene: Recordable,
     *,
     n_frames: int = 3,
     exposure: float = 0.0,
@@ -67,7 +83,7 @@ def record(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or World
         What is seen.
     n_frames : int, default 3
         T >= 1.
@@ -115,11 +131,7 @@ def record(
     if noise > 0:
         blurred += rng.normal(scale=noise / _GREY_LEVELS, size=blurred.shape)
     flow, visible = zip(*(scene.displacement(t, t + 1) for t in times), strict=True)
-    h = _VELOCITY_STEP
-    velocity = [
-        (scene.displacement(t, t + h)[0] - scene.displacement(t, t - h)[0]) / (2 * h)
-        for t in times
-    ]
+    velocity = [scene.velocity(t, _VELOCITY_STEP) for t in times]
     return Sequence(
         sharp=_quantised(sharp, bits),
         blurred=_quantised(blurred, bits),

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["plane_wave", "texture"]
+__all__ = ["checkers", "plane_wave", "texture"]
 
 # Mean and standard deviation of a texture: few samples reach black or white.
 _MEAN, _DEVIATION = 0.5, 0.18
@@ -93,3 +93,40 @@ def plane_wave(
     t, y, x = np.ogrid[:n_frames, :height, :width]
     along = frequency[0] * (x - velocity[0] * t) + frequency[1] * (y - velocity[1] * t)
     return np.asarray(0.5 + 0.5 * np.cos(2 * np.pi * along + phase))
+
+
+def checkers(
+    shape: tuple[int, int],
+    fields: tuple[int, int],
+    *,
+    dark: float = 0.15,
+    bright: float = 0.85,
+) -> NDArray[np.float64]:
+    """Return a board of ``fields`` (rows, columns) squares of two brightnesses.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        (H, W) px.
+    fields : (int, int)
+        At least 1 and at most the px of that side.
+    dark, bright : float, default 0.15 and 0.85
+        The upper left field is dark.
+
+    Returns
+    -------
+    ndarray of shape (H, W), float64
+
+    Raises
+    ------
+    ValueError
+        A shape without pixels, or more fields than pixels.
+    """
+    height, width = _shape(shape)
+    rows, columns = _shape(fields, "fields")
+    if rows > height or columns > width:
+        msg = f"fields must be at most {height, width}, got {rows, columns}"
+        raise ValueError(msg)
+    row = np.arange(height)[:, None] * rows // height
+    column = np.arange(width) * columns // width
+    return np.where((row + column) % 2 == 0, dark, bright)
