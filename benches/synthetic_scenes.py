@@ -13,7 +13,7 @@ many.
 from __future__ import annotations
 
 import argparse
-import datetime
+import datetime as dt
 import json
 import sys
 import time
@@ -23,9 +23,8 @@ from typing import Any
 import numpy as np
 import unsmear
 from numpy.typing import NDArray
-from unsmear import metrics, plot, synthetic
-
 from speed import processor
+from unsmear import metrics, plot, synthetic
 
 METHODS = ("fast", "balanced", "accurate", "steady")
 METHODS += ("least-squares", "fleet-jepson", "thesis")
@@ -153,7 +152,7 @@ def main() -> int:
     shape, n_frames = ((96, 128), 7) if given.quick else ((192, 256), 15)
     results, pictures = measure(shape, n_frames)
     report = {
-        "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        "date": dt.datetime.now(tz=dt.UTC).date().isoformat(),
         "processor": processor(),
         "version": unsmear.__version__,
         "shape": shape,

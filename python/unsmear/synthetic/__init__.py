@@ -5,14 +5,23 @@ function of time (`motion`); a sequence is that scene seen at whole times, and e
 around them (`sequence`). A `World` (`ray_caster`) holds solid bodies (`solids`,
 `terrain`) with patterns (`surface`), each with a pose as a function of time (`pose`),
 lit, shadowed and seen by a moving camera; nine of them recreate in kind the scenes of
-the founding work (`thesis_scenes`). Because motions are functions of time, flow is
-exact and a blurred frame is a true integral over its exposure.
+the founding work (`thesis_scenes`). `blur_cases` are single pictures blurred by known
+motions, to judge deblurring by. Because motions are functions of time, flow is exact
+and a blurred frame is a true integral over its exposure.
 """
 
 from __future__ import annotations
 
+from unsmear.synthetic.blur_cases import BLUR_CASES, BlurCase, blur_case
 from unsmear.synthetic.lighting import Light, Sky
-from unsmear.synthetic.motion import Motion, rotating, shaking, translating, zooming
+from unsmear.synthetic.motion import (
+    Motion,
+    flowing,
+    rotating,
+    shaking,
+    translating,
+    zooming,
+)
 from unsmear.synthetic.pose import looking, placed, turned
 from unsmear.synthetic.ray_caster import Body, Camera, World
 from unsmear.synthetic.scene import Layer, Scene
@@ -32,7 +41,9 @@ from unsmear.synthetic.texture import checkers, plane_wave, texture
 from unsmear.synthetic.thesis_scenes import THESIS_SCENES, thesis_scene
 
 __all__ = [
+    "BLUR_CASES",
     "THESIS_SCENES",
+    "BlurCase",
     "Body",
     "Box",
     "Camera",
@@ -48,7 +59,9 @@ __all__ = [
     "Surface",
     "Terrain",
     "World",
+    "blur_case",
     "checkers",
+    "flowing",
     "layers",
     "looking",
     "placed",

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Motion", "rotating", "shaking", "translating", "zooming"]
+__all__ = ["Motion", "flowing", "rotating", "shaking", "translating", "zooming"]
 
 Motion = Callable[[float], "tuple[NDArray[np.float64], NDArray[np.float64]]"]
 """t -> (A of shape (2, 2), b of shape (2,)), both acting on (x, y)."""
@@ -64,6 +64,49 @@ def zooming(rate: float, center: tuple[float, float] = (0.0, 0.0)) -> Motion:
     _constants("center", *center)
     c = np.array(center, float)
     return lambda t: (np.eye(2) * math.exp(rate * t), c * (1 - math.exp(rate * t)))
+
+
+def flowing(
+    velocity: tuple[float, float],
+    gradient: ArrayLike = ((0.0, 0.0), (0.0, 0.0)),
+    *,
+    quickening: float = 0.0,
+) -> Motion:
+    r"""Move along the affine velocity field ``velocity + gradient @ p``.
+
+    At time t the field is :math:`(1 + k t)` times that, k the ``quickening``, so what
+    passes a fixed point speeds up by k times the field. The path of a point solves
+    :math:`dp/d\tau = v + G p` with :math:`\tau = t + k t^2 / 2`: the matrix exponential
+    of :math:`\tau (G, v; 0, 0)`, by its series.
+
+    Parameters
+    ----------
+    velocity : (float, float)
+        (u, v) in the middle at time 0, px/frame.
+    gradient : array_like of shape (2, 2)
+        ((du/dx, du/dy), (dv/dx, dv/dy)), 1/frame.
+    quickening : float, default 0
+        Share of the speed gained per frame.
+    """
+    G = np.asarray(gradient, dtype=np.float64)
+    if G.shape != (2, 2):
+        msg = f"gradient must have shape (2, 2), got {G.shape}"
+        raise ValueError(msg)
+    _constants("velocity, gradient, quickening", *velocity, *G.ravel(), quickening)
+    field = np.zeros((3, 3))
+    field[:2, :2], field[:2, 2] = G, velocity
+
+    def motion(t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        step = field * (t + quickening * t * t / 2)
+        total, term, n = np.eye(3), np.eye(3), 0
+        # Terms shrink at last as |G|^n / n!.
+        while np.abs(term).max() > np.finfo(float).eps * np.abs(total).max():
+            n += 1
+            term = term @ step / n
+            total = total + term
+        return total[:2, :2], total[:2, 2]
+
+    return motion
 
 
 def shaking(

@@ -181,3 +181,23 @@ class Scene:
         ahead, _ = self.displacement(time, time + step)
         back, _ = self.displacement(time, time - step)
         return (ahead - back) / (2 * step)
+
+    def acceleration(self, time: float, step: float) -> NDArray[np.float64]:
+        """Return how the velocity at each pixel changes, (H, W, 2), px/frame^2.
+
+        At a fixed place, not along the motion, of the layer that is in front at
+        ``time``; central differences over ``2 step``.
+        """
+        points = self.points()
+        front = self.front(time, points)
+        change = np.zeros_like(points)
+
+        for number, layer in enumerate(self.layers):
+            earlier, later = (
+                layer.displacement(points, t, t + step)
+                - layer.displacement(points, t, t - step)
+                for t in (time - step, time + step)
+            )
+            own = front == number
+            change[own] = ((later - earlier) / (2 * step) ** 2)[own]
+        return change
