@@ -110,7 +110,8 @@ def markdown(report: dict[str, Any]) -> str:
         f"`unsmear.synthetic.thesis_scenes`, {report['shape'][1]} x "
         f"{report['shape'][0]} px, {report['frames']} frames, 8 bit, no noise; every "
         "method with its defaults (thesis: the three middle frames). Pixels that stay "
-        "visible, without any border cut off. Where a surface has no texture the truth "
+        "visible, without any border cut off; means of a method that leaves pixels out "
+        "count those it answers. Where a surface has no texture the truth "
         "is still its motion, which nobody can see: read rows, not single cells. "
         "Made by `benches/synthetic_scenes.py`.",
         "",

@@ -1,0 +1,84 @@
+"""The deblurring table: its rivals are given a fair problem, and it gets written."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from unsmear import synthetic
+
+BENCHES = Path(__file__).resolve().parent.parent / "benches"
+PICTURE = synthetic.texture((150, 150), seed=8, exponent=1.3)
+
+
+@pytest.fixture
+def rivals(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(BENCHES)
+    import deblur_rivals
+
+    return deblur_rivals
+
+
+def problem(rivals, name: str, noise: float = 0.0):
+    case = synthetic.blur_case(name, PICTURE, shape=(72, 72), noise=noise)
+    return case, rivals.Problem(
+        case.blurred.astype(float),
+        case.velocity.astype(float),
+        case.acceleration.astype(float),
+        noise,
+        case.sharp.astype(float),
+    )
+
+
+@pytest.mark.parametrize("name", ["T7", "R25", "SHa"])
+def test_the_matrix_is_the_blur(rivals, name: str) -> None:
+    case, given = problem(rivals, name)
+    matrix, (height, width) = rivals.path_problem_matrix(
+        given.velocity, given.acceleration
+    )
+    np.testing.assert_allclose(matrix.sum(axis=1), 1)
+    assert matrix.shape == (72 * 72, height * width)
+    # What the matrix takes from beyond the window is the picture there.
+    whole = synthetic.blur_case(name, PICTURE, shape=(height, width), noise=0.0)
+    made = (matrix @ whole.sharp.astype(float).ravel()).reshape(72, 72)
+    error = made - 255 * case.exposed
+    # The prototype's operator errs by .4 to .6 grey levels on smoother pictures; cut
+    # paths and cubic samples by as much here. Blur itself is 20 times that.
+    assert np.sqrt((error**2).mean()) < 1.0
+    assert np.std(255 * case.exposed - case.sharp) > 7
+
+
+@pytest.mark.parametrize("name", ["sk RL", "sk Wiener", "tiled RL"])
+def test_rivals_sharpen_what_they_can(rivals, name: str) -> None:
+    case, given = problem(rivals, "T7")
+    restored = rivals.RIVALS[name](given)
+    inner = np.s_[24:-24, 24:-24]
+    before, after = (np.std((x - case.sharp)[inner]) for x in (given.blurred, restored))
+    assert after < 0.8 * before
+
+
+def test_blind_deconvolution_keeps_brightness(rivals) -> None:
+    _, given = problem(rivals, "T3")
+    restored = rivals.RIVALS["blind RL"](given)
+    assert restored.mean() == pytest.approx(given.blurred.mean(), rel=0.02)
+
+
+def test_the_table_gets_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(BENCHES)
+    import deblur_table
+
+    arguments = "--pictures camera --cases T7 --noises 1 --seeds 1 --size 96".split()
+    arguments += ["--rivals", "blind RL", "--output", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["deblur_table", *arguments])
+    # It works with one thread; the tests after this one shall not.
+    monkeypatch.setattr(deblur_table.unsmear, "set_num_threads", lambda _: None)
+    assert deblur_table.main() == 0
+    report = json.loads((tmp_path / "deblur_table.json").read_text())
+    gains = {r["method"]: r["gain"] for r in report["records"]}
+    assert set(gains) == {*deblur_table.METHODS, "blind RL"}
+    assert gains["wiener"] > 3 > 0 > gains["thesis"]
+    table = (tmp_path / "deblur_table.md").read_text()
+    assert "| T7 |" in table and "wiener" in table
