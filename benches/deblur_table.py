@@ -75,9 +75,9 @@ def quality(picture: NDArray[Any], case: synthetic.BlurCase) -> dict[str, float]
 
 
 def blurred_cases(
-    names: list[str], pictures: list[str], size: int
+    names: list[str], pictures: list[str], size: int, *, with_matrix: bool = True
 ) -> Iterator[tuple[str, str, synthetic.BlurCase, Any]]:
-    """Yield each motion of each picture, with the motion's matrix."""
+    """Yield each motion of each picture, with the motion's matrix if wanted."""
     for case_name in names:
         matrix = None
         for n, picture in enumerate(pictures):
@@ -89,7 +89,7 @@ def blurred_cases(
                 case_name, grey(picture), shape=(size, size), noise=0.0, **options
             )
             # Only translations and shakes have a direction that differs by picture.
-            if matrix is None or case_name[0] in "TS2":
+            if with_matrix and (matrix is None or case_name[0] in "TS2"):
                 path = case.velocity.astype(float), case.acceleration.astype(float)
                 matrix = path_problem_matrix(*path)
             yield case_name, picture, case, matrix

@@ -70,8 +70,9 @@ def test_the_table_gets_written(
     monkeypatch.syspath_prepend(BENCHES)
     import deblur_table
 
-    arguments = "--pictures camera --cases T7 --noises 1 --seeds 1 --size 96".split()
-    arguments += ["--rivals", "blind RL", "--output", str(tmp_path)]
+    arguments = ["--pictures", "camera", "--cases", "T7", "--noises", "1"]
+    arguments += ["--seeds", "1", "--size", "96", "--rivals", "blind RL"]
+    arguments += ["--output", str(tmp_path)]
     monkeypatch.setattr(sys, "argv", ["deblur_table", *arguments])
     # It works with one thread; the tests after this one shall not.
     monkeypatch.setattr(deblur_table.unsmear, "set_num_threads", lambda _: None)
@@ -82,3 +83,22 @@ def test_the_table_gets_written(
     assert gains["wiener"] > 3 > 0 > gains["thesis"]
     table = (tmp_path / "deblur_table.md").read_text()
     assert "| T7 |" in table and "wiener" in table
+
+
+def test_wrong_velocities_are_told_apart(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(BENCHES)
+    import deblur_mismatch
+
+    right = np.zeros((2, 2, 2), np.float32) + np.float32([3, 4])
+    wrong = deblur_mismatch.distorted(right, 1.5, 90.0)
+    np.testing.assert_allclose(wrong[0, 0], [-6, 4.5], atol=1e-6)
+    arguments = ["--pictures", "camera", "--cases", "T7", "--noises", "1"]
+    arguments += ["--methods", "wiener", "--size", "96", "--output", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", ["deblur_mismatch", *arguments])
+    monkeypatch.setattr(deblur_mismatch.unsmear, "set_num_threads", lambda _: None)
+    assert deblur_mismatch.main() == 0
+    (record,) = json.loads((tmp_path / "deblur_mismatch.json").read_text())["records"]
+    assert record["gains"]["true"] > 3 + record["gains"]["x 1.5"]
+    assert "| all |" in (tmp_path / "deblur_mismatch.md").read_text()

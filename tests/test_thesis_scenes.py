@@ -1,5 +1,8 @@
 """The nine scenes: each moves as it says, with its own difficulty."""
 
+import doctest
+import importlib
+
 import numpy as np
 import pytest
 import unsmear
@@ -54,3 +57,10 @@ def test_shadows_move_where_the_wall_rests() -> None:
 def test_unknown_scenes_are_named() -> None:
     with pytest.raises(ValueError, match="name must be one of 'yosemite'"):
         thesis_scene("rubik")
+
+
+@pytest.mark.parametrize("name", ["thesis_scenes", "ray_caster", "blur_cases"])
+def test_examples_run(name: str) -> None:
+    module = importlib.import_module(f"unsmear.synthetic.{name}")
+    failed, tried = doctest.testmod(module)
+    assert failed == 0 < tried
