@@ -186,15 +186,21 @@ class World:
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         depth = np.full(len(directions), np.inf)
         body = np.full(len(directions), _NOTHING, dtype=np.intp)
+        # Only rays that pass within a body's radius need a closer look. With o the
+        # origin from the body and d the direction they pass at o^2 - (o.d)^2 / d^2.
         squares = (directions**2).sum(axis=1)
+        origin_squares = (origins**2).sum(axis=1)
+        along_origin = (origins * directions).sum(axis=1)
         for number, own in enumerate(self.bodies):
             rotation, position = own.pose(time)
-            way = origins - position
-            # Only rays that pass within the body's radius need a closer look.
-            along = (way * directions).sum(axis=1)
-            aside = (way**2).sum(axis=1) - along**2 / squares
-            near = np.flatnonzero(aside <= own.solid.radius**2 * (1 + _SAME_DEPTH))
-            met = own.solid.meet(way[near] @ rotation, directions[near] @ rotation)
+            along = along_origin - directions @ position
+            away = origin_squares - 2 * (origins @ position) + position @ position
+            reach = own.solid.radius**2 * (1 + _SAME_DEPTH)
+            near = np.flatnonzero(away - along**2 / squares <= reach)
+            if not near.size:
+                continue
+            way = (origins[near] - position) @ rotation
+            met = own.solid.meet(way, directions[near] @ rotation)
             first = met < depth[near]
             depth[near[first]], body[near[first]] = met[first], number
         return body, depth

@@ -162,17 +162,20 @@ class Terrain:
         o, d, here = origin[met], direction[met], distance[met]
         length = np.linalg.norm(d, axis=1)
         close = _CLOSE * self._spacing + _CLOSER_THAN_SEEN * here * length
+        at = o + here[:, None] * d
+        gap = -at[:, 1] - self.height(at[:, 0], at[:, 2])
         for _ in range(_NEWTON_STEPS):
-            at = o + here[:, None] * d
             slope_x, slope_z = self.slopes(at[:, 0], at[:, 2])
-            gap = -at[:, 1] - self.height(at[:, 0], at[:, 2])
             closing = d[:, 1] + slope_x * d[:, 0] + slope_z * d[:, 2]
             # At a glancing ray the tangent is no guide: it stays where it is.
-            step = here + gap / np.where(closing > 0, closing, np.inf)
-            there = o + step[:, None] * d
+            step = gap / np.where(closing > 0, closing, np.inf)
+            there = at + step[:, None] * d
             left = -there[:, 1] - self.height(there[:, 0], there[:, 2])
-            near = np.abs(step - here) * length < _NEAR * close
-            here = np.where(near & (np.abs(left) < np.abs(gap)), step, here)
+            better = np.abs(left) < np.abs(gap)
+            better &= np.abs(step) * length < _NEAR * close
+            here = here + np.where(better, step, 0.0)
+            at = np.where(better[:, None], there, at)
+            gap = np.where(better, left, gap)
         distance[met] = here
         return distance
 
