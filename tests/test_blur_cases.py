@@ -72,6 +72,9 @@ def test_layers_mix_only_around_the_disc() -> None:
     made = case("2L", noise=0.0)
     speed = np.linalg.norm(made.velocity, axis=-1)
     assert set(np.unique(speed.round(3))) == {np.float32(3.6), np.float32(13.0)}
+    # The disc goes another way than the background, 120 degrees from it.
+    between = made.velocity[40, 36] @ made.velocity[0, 0] / (3.6 * 13)
+    assert between == pytest.approx(-0.5, abs=1e-4)
     # Pure pixels see one layer all the time: its own translation explains them.
     pure = ~made.mixed
     assert made.mixed.any() and pure[40, 36] and pure[0, 0]

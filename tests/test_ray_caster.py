@@ -201,6 +201,35 @@ def test_solids_are_where_their_equations_say() -> None:
         np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1)
 
 
+def test_poses_are_their_equations() -> None:
+    motion = {"velocity": (1, -2, 3), "acceleration": (0.5, 1, -1)}
+    rotation, position = placed((1, 2, 3), **motion, axis=(0, 0, 2), degrees=30)(2.0)
+    np.testing.assert_allclose(position, [1 + 2 + 1, 2 - 4 + 2, 3 + 6 - 2])
+    # By 60 degrees about z (ahead): from x (right) to y (down).
+    half, root = 0.5, math.sqrt(3) / 2
+    expected = [[half, -root, 0], [root, half, 0], [0, 0, 1]]
+    np.testing.assert_allclose(rotation, expected, atol=1e-15)
+    view, eye = looking(lambda t: (0, 0, t), lambda _: (1, 0, 1), lambda _: 90.0)(0.0)
+    # Half to the right, and rolled by a quarter: the picture's right is down.
+    np.testing.assert_allclose(view[:, 2], [math.sqrt(half), 0, math.sqrt(half)])
+    np.testing.assert_allclose(view[:, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_array_equal(eye, 0)
+
+
+def test_no_two_sides_of_a_box_show_the_same_part() -> None:
+    corner = np.array([[-0.3, 0.2, 0.4]])
+    places = []
+    for side in range(3):
+        for sign in (-1.0, 1.0):
+            point = corner.copy()
+            point[0, side] = sign
+            place, normal = Box(2, 2, 2).chart(point)
+            places.append(place[0])
+            assert normal[0, side] == sign
+    apart = np.abs(np.subtract.outer(*2 * (np.array(places)[:, 0],)))
+    assert (apart + 9 * np.eye(6) > 2).all()
+
+
 def test_hills_are_met_at_the_first_crossing() -> None:
     hills = hilly(2)
     rng = np.random.default_rng(5)

@@ -106,7 +106,8 @@ class World:
     >>> bodies = (s.Body(s.Rectangle(), pattern, s.placed((0, 0, 8))),
     ...           s.Body(s.Sphere(0.5), pattern, s.placed((0, 0, 4), degrees=3)))
     >>> camera = s.Camera(s.placed(velocity=(0.2, 0, 0)), focal=80)
-    >>> clip = s.record(s.World(bodies, camera, (48, 64)), n_frames=2, exposure=0.5)
+    >>> world = s.World(bodies, camera, (48, 64))
+    >>> clip = s.record(world, n_frames=2, exposure=0.5, n_subframes=16)
     >>> clip.blurred.shape, clip.flow[0, 0, 0].round(6).tolist()
     ((2, 48, 64), [-2.0, 0.0])
     """
