@@ -83,6 +83,24 @@ def test_layers_mix_only_around_the_disc() -> None:
     assert np.abs(error[inside]).mean() < 0.7 < 5 < np.abs(error[~inside]).max()
 
 
+def test_a_clip_goes_on_from_its_case() -> None:
+    clip = synthetic.blur_clip("R5", PICTURE, shape=SHAPE, noise=0.0, n_frames=3)
+    made = case("R5", noise=0.0)
+    np.testing.assert_array_equal(clip.blurred[1], made.blurred)
+    np.testing.assert_array_equal(clip.velocity[0], made.velocity)
+    half = synthetic.blur_clip(
+        "T7", PICTURE, shape=SHAPE, noise=0.0, n_frames=1, exposure=0.5
+    )
+    assert half.exposure == 0.5
+    np.testing.assert_allclose(np.linalg.norm(half.velocity, axis=-1), 7, atol=1e-4)
+    whole = case("T7", noise=0.0)
+    np.testing.assert_array_equal(whole.sharp, half.sharp[0])
+    lost = [
+        np.std(b.astype(float) - whole.sharp) for b in (half.blurred[0], whole.blurred)
+    ]
+    assert 2 < lost[0] < 0.8 * lost[1]
+
+
 def test_noise_follows_its_seed() -> None:
     one, same, other = (case("T7", noise=5.0, seed=n).blurred for n in (1, 1, 2))
     assert one.tobytes() == same.tobytes()
@@ -111,6 +129,7 @@ def test_the_series_of_a_flow_is_its_path() -> None:
         (lambda: blur_case("2L", PICTURE, shape=SHAPE), "behind"),
         (lambda: blur_case("T3", PICTURE, shape=SHAPE, behind=BEHIND), "behind"),
         (lambda: blur_case("T3", PICTURE, shape=SHAPE, noise=-1), "noise"),
+        (lambda: synthetic.blur_clip("SHa", PICTURE, shape=SHAPE), "SHa"),
         (lambda: synthetic.flowing((1, 0), (1, 2)), "gradient"),
         (lambda: synthetic.flowing((1, 0), quickening=np.inf), "quickening"),
     ],

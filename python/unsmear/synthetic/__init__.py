@@ -12,7 +12,7 @@ and a blurred frame is a true integral over its exposure.
 
 from __future__ import annotations
 
-from unsmear.synthetic.blur_cases import BLUR_CASES, BlurCase, blur_case
+from unsmear.synthetic.blur_cases import BLUR_CASES, BlurCase, blur_case, blur_clip
 from unsmear.synthetic.lighting import Light, Sky
 from unsmear.synthetic.motion import (
     Motion,
@@ -60,6 +60,7 @@ __all__ = [
     "Terrain",
     "World",
     "blur_case",
+    "blur_clip",
     "checkers",
     "flowing",
     "layers",

@@ -1,8 +1,8 @@
 r"""Blurred pictures with known motion, to judge deblurring by.
 
-Ten motions, each over one exposure of one frame interval, applied to any picture:
+Eleven motions, each over one exposure of one frame interval, applied to any picture:
 translations of 3, 7, 11.3 and 21.7 px, a zoom, rotations by 5, 12 and 25 degrees, an
-affine shake of 12 to 16 px, the same while speeding up from half to one and a half
+affine shake of 10 to 17 px, the same while speeding up from half to one and a half
 times its speed, and two layers that move apart. A blurred picture is the mean of
 sub-frames, each sampled by a spline of degree 5 from the whole picture, so what enters
 the window from beyond is real.
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from unsmear.synthetic.motion import Motion
+    from unsmear.synthetic.sequence import Sequence
 
-__all__ = ["BLUR_CASES", "BlurCase", "blur_case"]
+__all__ = ["BLUR_CASES", "BlurCase", "blur_case", "blur_clip"]
 
 BLUR_CASES = {
     "T3": "translation by 3 px",
@@ -36,7 +37,7 @@ BLUR_CASES = {
     "R5": "rotation by 5 degrees",
     "R12": "rotation by 12 degrees",
     "R25": "rotation by 25 degrees",
-    "SH": "affine shake of 12 to 16 px",
+    "SH": "affine shake, 10 to 17 px over 240 x 240 px",
     "SHa": "the same while its speed triples",
     "2L": "a disc moving 3.6 px before a background moving 13 px",
 }
@@ -143,6 +144,75 @@ def blur_case(
     >>> case.blurred.dtype, case.velocity.shape
     (dtype('uint8'), (64, 64, 2))
     """
+    scene = _scene(name, picture, shape, direction, behind)
+    s = record(scene, n_frames=1, exposure=1.0, n_subframes=n_subframes)
+    return BlurCase(
+        sharp=_rounded(_WHITE * s.sharp[0]),
+        blurred=_rounded(_WHITE * s.blurred[0]),
+        exposed=s.blurred[0],
+        velocity=s.velocity[0],
+        acceleration=scene.acceleration(0.0, _STEP).astype(np.float32),
+        mixed=_mixed(scene, n_subframes),
+    ).with_noise(noise, seed)
+
+
+def blur_clip(
+    name: str,
+    picture: ArrayLike,
+    *,
+    shape: tuple[int, int],
+    direction: float = 30.0,
+    behind: ArrayLike | None = None,
+    n_frames: int = 5,
+    exposure: float = 1.0,
+    noise: float = 1.0,
+    seed: int = 0,
+    n_subframes: int = 96,
+) -> Sequence:
+    """Record a clip that moves on as one of the motions in ``BLUR_CASES``.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``BLUR_CASES`` but "SHa", whose speed would turn round.
+    picture, shape, direction, behind, noise, seed, n_subframes
+        As for `blur_case`; the longer the clip the more moves in.
+    n_frames : int, default 5
+        T >= 1; the middle one shows what `blur_case` shows.
+    exposure : float, default 1.0
+        Share of the frame interval; lengths of blur are this share of those named.
+
+    Returns
+    -------
+    Sequence
+        8 bit.
+
+    Raises
+    ------
+    ValueError
+        As `blur_case`.
+    """
+    if name == "SHa":
+        msg = "name must be that of a motion that can go on, got 'SHa'"
+        raise ValueError(msg)
+    return record(
+        _scene(name, picture, shape, direction, behind),
+        n_frames=n_frames,
+        exposure=exposure,
+        noise=noise,
+        bits=8,
+        seed=seed,
+        n_subframes=n_subframes,
+    )
+
+
+def _scene(
+    name: str,
+    picture: ArrayLike,
+    shape: tuple[int, int],
+    direction: float,
+    behind: ArrayLike | None,
+) -> Scene:
     if name not in BLUR_CASES:
         known = ", ".join(repr(case) for case in BLUR_CASES)
         msg = f"name must be one of {known}, got {name!r}"
@@ -159,16 +229,7 @@ def blur_case(
         front = Layer(picture, path)
         front.opacity = _disc(front.texture.shape[:2], _DISC * min(shape))
         layers = (background, front)
-    scene = Scene(layers, shape)
-    s = record(scene, n_frames=1, exposure=1.0, n_subframes=n_subframes)
-    return BlurCase(
-        sharp=_rounded(_WHITE * s.sharp[0]),
-        blurred=_rounded(_WHITE * s.blurred[0]),
-        exposed=s.blurred[0],
-        velocity=s.velocity[0],
-        acceleration=scene.acceleration(0.0, _STEP).astype(np.float32),
-        mixed=_mixed(scene, n_subframes),
-    ).with_noise(noise, seed)
+    return Scene(layers, shape)
 
 
 def _vector(length: float, degrees: float) -> tuple[float, float]:
