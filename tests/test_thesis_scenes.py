@@ -6,7 +6,7 @@ import importlib
 import numpy as np
 import pytest
 import unsmear
-from unsmear.synthetic import THESIS_SCENES, thesis_scene
+from unsmear.synthetic import THESIS_SCENES, sphere, thesis_scene
 
 SHAPE = (72, 96)
 # Largest speed promised, px/frame in a picture 256 px wide.
@@ -35,7 +35,7 @@ def test_each_scene_moves_as_it_says(name: str) -> None:
 
 
 def test_the_ball_turns_before_nothing() -> None:
-    s = thesis_scene("sphere", shape=SHAPE, n_frames=1)
+    s = sphere(shape=SHAPE, n_frames=1)
     assert (s.flow[0, :, :8] == 0).all() and (s.sharp[0, :, :8] == 0.35).all()
 
 

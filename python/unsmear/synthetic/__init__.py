@@ -38,7 +38,7 @@ from unsmear.synthetic.solids import Box, Disc, Rectangle, Sphere
 from unsmear.synthetic.surface import Surface
 from unsmear.synthetic.terrain import Terrain
 from unsmear.synthetic.texture import checkers, plane_wave, texture
-from unsmear.synthetic.thesis_scenes import THESIS_SCENES, thesis_scene
+from unsmear.synthetic.thesis_scenes import THESIS_SCENES, sphere, thesis_scene
 
 __all__ = [
     "BLUR_CASES",
@@ -72,6 +72,7 @@ __all__ = [
     "rotation",
     "shake",
     "shaking",
+    "sphere",
     "texture",
     "thesis_scene",
     "translating",

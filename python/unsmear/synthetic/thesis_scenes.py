@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from unsmear.synthetic.ray_caster import World
 
-__all__ = ["THESIS_SCENES", "thesis_scene"]
+__all__ = ["THESIS_SCENES", "sphere", "thesis_scene"]
 
 THESIS_SCENES: dict[str, Callable[[tuple[int, int]], World]] = {
     "yosemite": outdoors.yosemite,
@@ -72,3 +72,8 @@ def thesis_scene(
         msg = f"name must be one of {known}, got {name!r}"
         raise ValueError(msg)
     return record(THESIS_SCENES[name](shape), **options)
+
+
+def sphere(*, shape: tuple[int, int] = (192, 256), **options: Any) -> Sequence:
+    """Record a checkered ball that turns in place: `thesis_scene` "sphere"."""
+    return thesis_scene("sphere", shape=shape, **options)
