@@ -66,7 +66,7 @@ def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
 def show_result(result: dict[str, Any], *, as_json: bool) -> None:
     """Print a result: JSON, or one aligned line per entry."""
     if as_json:
-        print(json.dumps(_plain(result), indent=2))
+        print(json.dumps(plain(result), indent=2))
         return
     flat = dict(_flatten(result))
     width = max(map(len, flat), default=0)
@@ -92,12 +92,12 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Replace what JSON cannot say (NaN, infinity) by null."""
     if isinstance(value, dict):
-        return {str(name): _plain(item) for name, item in value.items()}
+        return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
