@@ -70,8 +70,8 @@ def estimate(
     )
     guide = None
     if channel_axis is not None:
-        colour = used[reference - first]
-        guide = np.ascontiguousarray(np.moveaxis(colour, -1, 0))
+        # No name keeps the colour frames alive: they are the largest part of memory.
+        guide = np.ascontiguousarray(np.moveaxis(used[reference - first], -1, 0))
         used = np.ascontiguousarray(luma(used))
     flow, confidence, levels = _unsmear.coarse_to_fine(
         used,

@@ -94,6 +94,7 @@ COMPONENT_PARAMETERS: dict[str, Any] = {
     "orientations": 6,
     "support": 3.0,
     "temporal": "steps",
+    "least_steadiness": 0.0,
     "amplitude_fraction": 0.05,
     "tau": 1.25,
     "border": "replicate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from unsmear.flow import reference_frame
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from unsmear._progress import Progress
+    from unsmear._progress import Progress, Steps
 
 __all__ = ["ComponentVelocities", "component_velocities"]
 
@@ -38,12 +39,15 @@ class ComponentVelocities:
     orientation : ndarray of shape (N,), float64
         Direction of each filter's wavevector against the x axis, rad; positive turns
         from right to down. In [0, pi), or (-pi, pi] for the velocity-tuned filters.
+    frequency : ndarray of shape (N,), float64
+        Length of each filter's wavevector, cycles/px.
     """
 
     velocity: NDArray[np.float32]
     phase_gradient: NDArray[np.float32]
     amplitude: NDArray[np.float32]
     orientation: NDArray[np.float64]
+    frequency: NDArray[np.float64]
 
 
 def component_velocities(
@@ -62,7 +66,8 @@ def component_velocities(
 
     believed where the amplitude is at least ``amplitude_fraction`` of the largest and
     the instantaneous frequency within ``tau / sigma`` of the tuned one. Two motions at
-    a boundary or through a transparency show as two groups of components.
+    a boundary or through a transparency show as two groups of components, which
+    `several_motions` tells apart.
 
     Parameters
     ----------
@@ -75,14 +80,21 @@ def component_velocities(
     progress : callable, optional
         Called with the share done in [0, 1]; an exception it raises cancels the call.
     **parameters
-        ``tuning_frequency=0.15`` (cycles/px), ``bandwidth_octaves=0.8`` (at one
-        deviation of the spectrum), ``orientations=6`` (over 180 degrees),
-        ``support=3.0`` (deviations of the window), ``amplitude_fraction=0.05``,
+        ``tuning_frequency=0.15`` (cycles/px; one, or several for as many scales: their
+        filters follow one another in the result, in the order given),
+        ``bandwidth_octaves=0.8`` (at one deviation of the spectrum),
+        ``orientations=6`` (over 180 degrees), ``support=3.0`` (deviations of the
+        window), ``amplitude_fraction=0.05`` (of the largest of its scale),
         ``tau=1.25``, ``border="replicate"`` ("reflect", "zero"), and ``temporal``:
         "steps" (default: mean phase difference to the neighbouring frames, exact for
         uniform shifts up to half a wavelength), "gaussian" (a window over many frames,
-        no carrier: slow motion only) or "velocity-tuned" (22 filters; ``orientations``
-        is then not used).
+        no carrier: slow motion only) or "velocity-tuned" (22 filters over many frames,
+        each of a range of motions: the sharpest eye for two motions in one place;
+        ``orientations`` is then not used). ``least_steadiness=0.0``, of "steps" only:
+        the harmonic agreement ``2 a0 a1 / (a0^2 + a1^2)`` that amplitudes of
+        neighbouring frames must have. Two motions in one filter beat, and 0.95 sorts
+        most of what they leave out, with half of the good; 0 tests nothing, right for
+        one motion per neighbourhood.
 
     Returns
     -------
@@ -99,8 +111,18 @@ def component_velocities(
     References
     ----------
     .. [1] D. J. Fleet, A. D. Jepson, IJCV 5 (1990) 77-104, doi:10.1007/BF00056772
+
+    Examples
+    --------
+    >>> import numpy as np, unsmear
+    >>> frames = unsmear.synthetic.plane_wave((48, 48), (0.1, 0.0), velocity=(1.5, 0.0))
+    >>> c = unsmear.component_velocities(frames, tuning_frequency=(0.1, 0.2))
+    >>> c.velocity.shape, c.frequency.round(2).tolist()[::6]
+    ((12, 48, 48, 2), [0.1, 0.2])
+    >>> c.velocity[0, 24, 24].round(2).tolist()
+    [1.5, 0.0]
     """
-    values = checked(parameters, COMPONENT_PARAMETERS, "component_velocities")
+    scales = _scales(parameters)
     grey = as_grey_frames(frames, channel_axis, np.float64)
     if not np.isfinite(grey).all():
         msg = "frames must be finite everywhere"
@@ -108,13 +130,45 @@ def component_velocities(
     reference = reference_frame(index, grey.shape[0])
     # Without its mean a sequence keeps the digits of its contrast in single precision.
     centred = (grey - (grey.mean() if grey.size else 0.0)).astype(np.float32)
-    planes, wavevectors = _unsmear.component_velocities(
-        centred, reference, values, progress=of_steps(progress)
-    )
-    k = np.asarray(wavevectors)
+    steps = of_steps(progress)
+    banks = [
+        _unsmear.component_velocities(
+            centred, reference, values, progress=_share(steps, number, len(scales))
+        )
+        for number, values in enumerate(scales)
+    ]
+    planes = np.concatenate([planes for planes, _ in banks], axis=1)
+    k = np.concatenate([np.asarray(wavevectors) for _, wavevectors in banks])
     return ComponentVelocities(
         velocity=np.ascontiguousarray(np.moveaxis(planes[3:5], 0, -1)),
         phase_gradient=np.ascontiguousarray(np.moveaxis(planes[:3], 0, -1)),
         amplitude=np.ascontiguousarray(planes[5]),
         orientation=np.arctan2(k[:, 1], k[:, 0]),
+        frequency=np.hypot(k[:, 0], k[:, 1]) / (2 * np.pi),
     )
+
+
+def _scales(parameters: dict[str, Any]) -> list[dict[str, Any]]:
+    """Parameters of the bank of each scale, names and types checked."""
+    given: Any = parameters.get("tuning_frequency")
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
+        return [checked(parameters, COMPONENT_PARAMETERS, "component_velocities")]
+    frequencies = list(given)
+    if not frequencies:
+        msg = "tuning_frequency must name at least one frequency, got none"
+        raise ValueError(msg)
+    return [
+        checked(
+            parameters | {"tuning_frequency": frequency},
+            COMPONENT_PARAMETERS,
+            "component_velocities",
+        )
+        for frequency in frequencies
+    ]
+
+
+def _share(steps: Steps | None, number: int, count: int) -> Steps | None:
+    """Progress of one of several equal parts."""
+    if steps is None:
+        return None
+    return lambda done, of: steps(number * of + done, count * of)

@@ -70,8 +70,13 @@ pub(crate) fn component_velocities(parameters: &Bound<'_, PyAny>) -> PyResult<Co
             return Err(unknown_name("temporal", expected, name));
         }
     };
-    let tests = parameters.extract::<Tests>()?.into();
-    Ok(ComponentVelocities { gabor: bank.gabor(), tests, temporal, border: bank.border()? })
+    Ok(ComponentVelocities {
+        gabor: bank.gabor(),
+        tests: parameters.extract::<Tests>()?.into(),
+        temporal,
+        least_steadiness: parameters.get_item("least_steadiness")?.extract()?,
+        border: bank.border()?,
+    })
 }
 
 #[derive(FromPyObject)]

@@ -8,17 +8,25 @@
 //!
 //! the only part of the motion that one filter can see, believed where the amplitude and frequency
 //! tests of [`crate::component_tests`] hold. For filters without a temporal carrier the frequency
-//! test runs over `(phi_x, phi_y)` only.
+//! test runs over `(phi_x, phi_y)` only; where steps between frames are taken a third test asks that
+//! the amplitude be steady,
+//!
+//! ```text
+//! q = 2 a_0 a_1/(a_0^2 + a_1^2) >= least steadiness           for each neighbouring frame
+//! ```
+//!
+//! Two motions in one filter beat, as two tones do: between them the amplitude rises and falls and
+//! the phase turns at the rate of neither.
 //!
 //! Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), section 4.
 
 use ndarray::{Array4, ArrayView3, Axis};
 
-use crate::array::{for_each_row, require_frames};
+use crate::array::{for_each_row_with, require_frames};
 use crate::border::Border;
 use crate::component_tests::{ComponentTests, largest_amplitude};
 use crate::control::Control;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, require};
 use crate::gabor::{GaborBank, GaborParameters};
 use crate::phase_gradient::PhaseGradient;
 use crate::phase_rate::{phase_step, rate_of_phase};
@@ -61,6 +69,8 @@ pub struct ComponentVelocities {
     pub tests: ComponentTests,
     /// The time derivative.
     pub temporal: Temporal,
+    /// `q` at least, in [0, 1]; 0 tests nothing. Of [`Temporal::Steps`] only.
+    pub least_steadiness: f64,
     /// Border rule of the filters.
     pub border: Border,
 }
@@ -88,6 +98,9 @@ impl ComponentVelocities {
         control: &Control,
     ) -> Result<ComponentField<T>> {
         self.tests.check()?;
+        require("least_steadiness", self.least_steadiness, "in [0, 1]", |q| {
+            (0.0..=1.0).contains(&q)
+        })?;
         require_frames("frames", &frames, [2, 1, 1])?;
         if index >= frames.dim().0 {
             let expected = format!("in 0..={}", frames.dim().0 - 1);
@@ -100,7 +113,7 @@ impl ComponentVelocities {
         }
         .respond(frames, index, self.border, control)?;
         let tuned = self.temporal == Temporal::VelocityTuned;
-        self.collect(frames, &channels, control, |channel, filter, y, power, phi_t| {
+        self.collect(frames, &channels, control, |channel, filter, y, power, phi_t, _| {
             let (re, im) = channel.response.row(filter, y);
             let (d_re, d_im) = channel.slope.row(filter, y);
             rate_of_phase([re, im], [d_re, d_im], power, T::of(channel.omega), phi_t);
@@ -126,13 +139,14 @@ impl ComponentVelocities {
         let channel =
             Channel { wavevectors, omega: 0.0, slope: responses.swap_remove(here), response };
         let neighbours = responses;
-        self.collect(frames, &[channel], control, |channel, filter, y, _, phi_t| {
+        self.collect(frames, &[channel], control, |channel, filter, y, power, phi_t, steady| {
             phi_t.fill(T::zero());
             let mut step = vec![T::zero(); phi_t.len()];
             let share = T::one() / T::of(neighbours.len() as f64);
             for (n, neighbour) in neighbours.iter().enumerate() {
                 let (mut first, mut second) =
                     (channel.response.row(filter, y), neighbour.row(filter, y));
+                add_beat(power, second, steady);
                 let earlier = here == 1 && n == 0;
                 if earlier {
                     (first, second) = (second, first);
@@ -144,14 +158,14 @@ impl ComponentVelocities {
         })
     }
 
-    /// Tests and velocities of all channels; `phi_t` fills in its row and tells whether the
-    /// frequency test takes it in.
+    /// Tests and velocities of all channels; `phi_t` fills in its row, lowers the steadiness, which
+    /// starts at 1, and tells whether the frequency test takes it in.
     fn collect<T: Real>(
         &self,
         frames: ArrayView3<'_, T>,
         channels: &[Channel<T>],
         control: &Control,
-        phi_t: impl Fn(&Channel<T>, usize, usize, &[T], &mut [T]) -> bool + Sync,
+        phi_t: impl Fn(&Channel<T>, usize, usize, &[T], &mut [T], &mut [T]) -> bool + Sync,
     ) -> Result<ComponentField<T>> {
         let (_, height, width) = frames.dim();
         let filters: usize = channels.iter().map(|c| c.wavevectors.len()).sum();
@@ -163,15 +177,18 @@ impl ComponentVelocities {
             .iter()
             .map(|c| PhaseGradient::new(&c.response, &c.wavevectors, control))
             .collect::<Result<Vec<_>>>()?;
+        let least_steadiness = T::of(self.least_steadiness);
         let mut planes = vec![T::zero(); 6 * filters * height * width];
-        for_each_row(&mut planes, 6 * filters * width, control, |y, out| {
+        let scratch = || vec![T::one(); width];
+        for_each_row_with(&mut planes, 6 * filters * width, control, scratch, |y, out, steady| {
             let mut rows = out.chunks_mut(6 * width);
             for (channel, gradient) in channels.iter().zip(&gradients) {
                 for (filter, k) in channel.wavevectors.iter().enumerate() {
                     let Some(out) = rows.next() else { return };
                     let row = gradient.row(filter, y);
                     let (phi, rest) = out.split_at_mut(3 * width);
-                    let timed = phi_t(channel, filter, y, row.power, &mut phi[2 * width..]);
+                    steady.fill(T::one());
+                    let timed = phi_t(channel, filter, y, row.power, &mut phi[2 * width..], steady);
                     for x in 0..width {
                         let (px, py, pt) = (row.phi_x[x], row.phi_y[x], phi[2 * width + x]);
                         (phi[x], phi[width + x]) = (px, py);
@@ -179,7 +196,7 @@ impl ComponentVelocities {
                         let dt = if timed { pt - T::of(channel.omega) } else { T::zero() };
                         let power = row.power[x];
                         let near = dx * dx + dy * dy + dt * dt <= farthest;
-                        let velocity = if near && power >= least {
+                        let velocity = if near && power >= least && steady[x] >= least_steadiness {
                             component_velocity([px, py, pt])
                         } else {
                             [T::nan(); 2]
@@ -195,6 +212,18 @@ impl ComponentVelocities {
             .permuted_axes([2, 1, 0, 3]);
         let wavevectors = channels.iter().flat_map(|c| c.wavevectors.clone()).collect();
         Ok(ComponentField { planes, wavevectors })
+    }
+}
+
+/// Lowers `steady` to `q` between responses of squared amplitude `power` and others of the same row.
+fn add_beat<T: Real>(power: &[T], (re, im): (&[T], &[T]), steady: &mut [T]) {
+    for (((q, &p), &re), &im) in steady.iter_mut().zip(power).zip(re).zip(im) {
+        let other = re * re + im * im;
+        let ratio = T::of(2.0) * (p * other).sqrt() / (p + other);
+        // Silence in both is steady, and no other test lets it pass.
+        if ratio < *q {
+            *q = ratio;
+        }
     }
 }
 
@@ -242,5 +271,15 @@ mod tests {
             }
             assert!(known >= 2, "{temporal:?} keeps {known}");
         }
+    }
+
+    /// Amplitudes 3 and 4, then 3 and 1: q = 24/25, then 6/10.
+    #[test]
+    fn steadiness_is_that_of_the_worst_neighbour() {
+        let mut steady = [1.0f64, 1.0];
+        add_beat(&[9.0, 0.0], (&[4.0, 0.0], &[0.0, 0.0]), &mut steady);
+        assert!((steady[0] - 0.96).abs() < 1e-15 && steady[1] == 1.0);
+        add_beat(&[9.0, 0.0], (&[0.0, 0.0], &[1.0, 0.0]), &mut steady);
+        assert!((steady[0] - 0.6).abs() < 1e-15);
     }
 }

@@ -145,7 +145,7 @@ pub(crate) fn pad_row<T: Real>(row: &[T], radius: usize, border: Border, padded:
 
 /// `out[x] = sum_j weights[j] rows[j][x]`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn weighted_sum<T: Real>(rows: &[&[T]], weights: &[T], out: &mut [T]) {
+pub(crate) fn weighted_sum<T: Real>(rows: &[&[T]], weights: &[T], out: &mut [T]) {
     for start in (0..out.len()).step_by(LANES) {
         let end = (start + LANES).min(out.len());
         let out = &mut out[start..end];

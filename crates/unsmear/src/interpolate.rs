@@ -19,12 +19,6 @@
 //! 41 (1993) 821-833, [10.1109/78.193220](https://doi.org/10.1109/78.193220);
 //! P. Thevenaz, T. Blu, M. Unser, "Interpolation revisited", IEEE Trans. Medical Imaging 19 (2000) 739-758,
 //! [10.1109/42.875199](https://doi.org/10.1109/42.875199).
-#![allow(
-    clippy::inline_always,
-    reason = "a helper gets its caller's vector instructions only when inlined"
-)]
-
-use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2};
 
 use crate::array::{for_each_row_with, require_same};
@@ -34,6 +28,7 @@ use crate::error::{Error, Result};
 use crate::flow_field::FlowView;
 use crate::real::Real;
 use crate::spline_filter::{cubic_poles, quintic_poles, spline_coefficients};
+use crate::spline_values::{evaluate, moved};
 
 /// Degree of the spline between the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -153,14 +148,13 @@ impl<T: Real> SplineImage<T> {
         require_same("flow", &flow.u, self.dim())?;
         let mut out = Array2::zeros(self.dim());
         let width = self.width;
+        let (u, v) = (flow.u.as_standard_layout(), flow.v.as_standard_layout());
+        let [u, v] = [&u, &v].map(|c| c.as_slice().unwrap_or_default());
         let scratch = || (vec![0.0; width], vec![0.0; width]);
         let values = out.as_slice_mut().unwrap_or_default();
         for_each_row_with(values, width, control, scratch, |i, row, (rows, columns)| {
-            // Added in f64: in f32 a flow of 0.1 px at column 2000 would keep three digits only.
-            for (x, (u, v)) in flow.u.row(i).iter().zip(flow.v.row(i)).enumerate() {
-                columns[x] = x as f64 + u.as_f64();
-                rows[x] = i as f64 + v.as_f64();
-            }
+            let line = i * width..(i + 1) * width;
+            moved(i, &u[line.clone()], &v[line], rows, columns);
             self.sample_line(rows, columns, row);
         })?;
         Ok(out)
@@ -176,107 +170,4 @@ impl<T: Real> SplineImage<T> {
             SplineDegree::Quintic => evaluate::<T, 6>(c, size, reflect, y, x, out),
         }
     }
-}
-
-/// Samples the spline with N = degree + 1 taps per axis at a line of positions.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn evaluate<T: Real, const N: usize>(
-    c: &[T],
-    [height, width]: [usize; 2],
-    reflect: bool,
-    y: &[f64],
-    x: &[f64],
-    out: &mut [T],
-) {
-    for ((&y, &x), value) in y.iter().zip(x).zip(out) {
-        if !(y.is_finite() && x.is_finite()) {
-            *value = T::nan();
-            continue;
-        }
-        let (first_row, ty) = first_tap::<T, N>(y, height, reflect);
-        let (first_column, tx) = first_tap::<T, N>(x, width, reflect);
-        let (wy, wx) = (weights::<T, N>(ty), weights::<T, N>(tx));
-        // Down the columns first: N independent sums side by side, added up once at the end.
-        let mut down = [T::zero(); N];
-        let inside = first_row >= 0
-            && first_column >= 0
-            && first_row as usize + N <= height
-            && first_column as usize + N <= width;
-        if inside {
-            let corner = first_row as usize * width + first_column as usize;
-            for k in 0..N {
-                let line = &c[corner + k * width..][..N];
-                for l in 0..N {
-                    down[l] += wy[k] * line[l];
-                }
-            }
-        } else {
-            // The coefficients continue as the mirror does, whatever the rule for positions.
-            let at = |i: isize, n| Border::Reflect.index(i, n).unwrap_or_default();
-            for k in 0..N {
-                let line = at(first_row + k as isize, height) * width;
-                for l in 0..N {
-                    down[l] += wy[k] * c[line + at(first_column + l as isize, width)];
-                }
-            }
-        }
-        let mut sum = T::zero();
-        for l in 0..N {
-            sum += wx[l] * down[l];
-        }
-        *value = sum;
-    }
-}
-
-/// The first of the N samples around a finite position on a line of `n` samples, and the position's fraction.
-#[inline(always)]
-fn first_tap<T: Real, const N: usize>(position: f64, n: usize, reflect: bool) -> (isize, T) {
-    let last = (n - 1) as f64;
-    let mut p = position;
-    if p < 0.0 || p > last {
-        p = if reflect && n > 1 {
-            let folded = p.rem_euclid(2.0 * last);
-            folded.min(2.0 * last - folded)
-        } else {
-            p.clamp(0.0, last)
-        };
-    }
-    let whole = p as isize; // p >= 0: truncation is the floor
-    (whole - (N as isize / 2 - 1), T::of(p - whole as f64))
-}
-
-/// `B_n(t - k)` for the N = n + 1 samples k whose B-splines reach the position at fraction `t` in [0, 1).
-///
-/// Written in powers of t and of 1 - t on each piece, so that no large terms cancel in `f32`.
-#[inline(always)]
-fn weights<T: Real, const N: usize>(t: T) -> [T; N] {
-    let mut w = [T::zero(); N];
-    let ends = [T::one() - t, t];
-    for (end, &s) in ends.iter().enumerate() {
-        // From the outermost sample inwards; the two ends are mirror images.
-        let at = |k: usize| if end == 0 { k } else { N - 1 - k };
-        let s2 = s * s;
-        let s3 = s2 * s;
-        match N {
-            2 => w[at(0)] = s,
-            4 => {
-                let scale = T::of(1.0 / 6.0);
-                w[at(0)] = s3 * scale;
-                w[at(1)] = (T::one() + T::of(3.0) * (s + s2 - s3)) * scale;
-            }
-            _ => {
-                let scale = T::of(1.0 / 120.0);
-                let five = T::of(5.0);
-                let (s4, s5) = (s2 * s2, s3 * s2);
-                w[at(0)] = s5 * scale;
-                w[at(1)] = (T::one() + five * (s + s4 - s5) + T::of(10.0) * (s2 + s3)) * scale;
-                w[at(2)] = (T::of(26.0)
-                    + T::of(50.0) * s
-                    + T::of(20.0) * (s2 - s3 - s4)
-                    + T::of(10.0) * s5)
-                    * scale;
-            }
-        }
-    }
-    w
 }

@@ -9,11 +9,12 @@
 //! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
-//! | 4 | [`pyramid`], `spline_filter`, [`median`], [`immerkaer_noise`] | sizes of pictures; splines; median; noise |
+//! | 4 | `smoothing`, `spline_filter`, `spline_values`, [`median`], [`immerkaer_noise`] | Gaussian; splines; median; noise |
 //! | 4 | `sor::system`, `weighted_median::middle`, `weighted_median::parameters` | parts of the two below |
 //! | 5 | `sor::layout`, `weighted_median::window` | |
 //! | 6 | `sor::relax` | |
 //! | 7 | [`sor`], [`weighted_median`] | solver of the default flow; median with weights |
+//! | 5 | [`pyramid`] | sizes of pictures |
 //! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
 //! | 6 | `gabor::respond` | its passes |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
@@ -21,7 +22,7 @@
 //! | 8 | [`component_velocity`] | what one filter sees of the motion |
 //! | 8 | [`flow`], [`flow::thesis::bank`] | an estimate of flow, with confidence; the founding filters |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
-//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::rows`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence` | parts of the default flow |
+//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::rows`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible` | parts of the default flow |
 //! | 10 | `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
 //! | 11 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still` | |
 //! | 12 | `flow::coarse_to_fine::level` | one scale |
@@ -68,9 +69,11 @@ pub mod phase_rate;
 pub mod psf;
 pub mod pyramid;
 pub mod real;
+mod smoothing;
 pub mod sor;
 pub mod spatiotemporal;
 mod spline_filter;
+mod spline_values;
 mod streamline;
 pub mod weighted_median;
 

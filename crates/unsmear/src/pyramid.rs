@@ -16,17 +16,15 @@
 //! filters. Sources: P. J. Burt & E. H. Adelson 1983 (doi 10.1109/TCOM.1983.1095851) for the
 //! pyramid; R. G. Keys 1981 (doi 10.1109/TASSP.1981.1163711) for the cubic.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2};
 
 use crate::array::for_each_row_with;
 use crate::border::Border;
 use crate::control::Control;
-use crate::convolve::{correlate_axis, gaussian_taps};
 use crate::error::Result;
 use crate::real::Real;
+pub use crate::smoothing::smooth;
 
-/// Where the taps of [`smooth`] end, in deviations: what is cut off weighs less than 1e-4.
-const SUPPORT: f64 = 4.0;
 /// Deviation before halving, px: a little alias against a little blur.
 const HALVING_SIGMA: f64 = 0.9;
 /// Slope of the cubic at distance 1: the one for which straight lines stay straight.
@@ -39,23 +37,6 @@ pub enum Resampling {
     Linear,
     /// Four samples per axis.
     Cubic,
-}
-
-/// `picture` convolved with a Gaussian of deviation `sigma` px, reflected at the edge.
-///
-/// # Errors
-/// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn smooth<T: Real>(
-    picture: ArrayView2<'_, T>,
-    sigma: f64,
-    control: &Control,
-) -> Result<Array2<T>> {
-    let radius = (SUPPORT * sigma).ceil() as usize;
-    let taps: Vec<T> = gaussian_taps(sigma, radius).into_iter().map(T::of).collect();
-    let volume = picture.insert_axis(Axis(0));
-    let rows = correlate_axis(volume, &taps, 2, Border::Reflect, control)?;
-    let both = correlate_axis(rows.view(), &taps, 1, Border::Reflect, control)?;
-    Ok(both.index_axis_move(Axis(0), 0))
 }
 
 /// `picture` at another size, areas centred on areas; see the [module](self). Not smoothed.
@@ -87,12 +68,42 @@ pub fn resample<T: Real>(
             let row = &source[k * columns..(k + 1) * columns];
             line.iter_mut().zip(row).for_each(|(sum, &s)| *sum += weight * s);
         }
-        for (x, out) in out.iter_mut().enumerate() {
-            let taps = across.samples(x).zip(across.weights(x));
-            *out = taps.fold(T::zero(), |sum, (&k, &w)| sum + w * line[k]);
+        match kind {
+            Resampling::Linear if columns == 2 * width => halve(line, out),
+            Resampling::Linear if width == 2 * columns => double(line, out),
+            _ => {
+                for (x, out) in out.iter_mut().enumerate() {
+                    let taps = across.samples(x).zip(across.weights(x));
+                    *out = taps.fold(T::zero(), |sum, (&k, &w)| sum + w * line[k]);
+                }
+            }
         }
     })?;
     Ok(out)
+}
+
+/// [`Resampling::Linear`] to half the samples: with the same bits as the general form, in vectors.
+fn halve<T: Real>(line: &[T], out: &mut [T]) {
+    let half = T::of(0.5);
+    for (pair, out) in line.chunks_exact(2).zip(out) {
+        *out = T::zero() + half * pair[0] + half * pair[1];
+    }
+}
+
+/// [`Resampling::Linear`] to twice the samples, likewise.
+fn double<T: Real>(line: &[T], out: &mut [T]) {
+    let (near, far) = (T::of(0.75), T::of(0.25));
+    let pair = |before: T, here: T, after: T| {
+        [T::zero() + far * before + near * here, T::zero() + near * here + far * after]
+    };
+    let last = line.len() - 1;
+    for (around, out) in line.windows(3).zip(out[2.min(2 * last)..].chunks_exact_mut(2)) {
+        out.copy_from_slice(&pair(around[0], around[1], around[2]));
+    }
+    for i in [0, last] {
+        let (before, after) = (line[i.saturating_sub(1)], line[(i + 1).min(last)]);
+        out[2 * i..2 * i + 2].copy_from_slice(&pair(before, line[i], after));
+    }
 }
 
 /// The sizes (H, W) of the levels, finest first: as long as the shorter side keeps `least` samples.
@@ -201,6 +212,28 @@ mod tests {
                 let expected = 3.0 + 2.0 * at(x, 32.0, size.1) - 0.5 * at(y, 40.0, size.0);
                 assert!((small[(y, x)] - expected).abs() < 1e-12, "{kind:?} {size:?}");
             }
+        }
+    }
+
+    /// The forms for half and twice the samples give the bits of the general one, which reads one line more.
+    #[test]
+    fn half_and_twice_are_the_general_form() {
+        for n in [1, 2, 3, 4, 7, 16, 33] {
+            let line: Vec<f32> = (0..2 * n).map(|i| ((i * i * 7) % 23) as f32 - 11.3).collect();
+            let direct = |line: &[f32], to: usize| -> Vec<f32> {
+                let reads = reads::<f32>(line.len(), to, Resampling::Linear);
+                let value = |i| {
+                    reads.samples(i).zip(reads.weights(i)).fold(0.0, |s, (&k, &w)| s + w * line[k])
+                };
+                (0..to).map(value).collect()
+            };
+            let (mut small, mut large) = (vec![0.0; n], vec![0.0; 4 * n]);
+            halve(&line, &mut small);
+            double(&line, &mut large);
+            assert_eq!((small, large), (direct(&line, n), direct(&line, 4 * n)), "{n}");
+            let (one, mut two) = (&line[..1], [0.0; 2]);
+            double(one, &mut two);
+            assert_eq!(two.to_vec(), direct(one, 2));
         }
     }
 

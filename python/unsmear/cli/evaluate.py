@@ -1,21 +1,29 @@
-"""``unsmear evaluate``: flow against the truth, or one picture against another."""
+"""``unsmear evaluate``: flow against the truth, methods over a folder, or pictures."""
 
 from __future__ import annotations
 
+import json
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from unsmear import metrics
+from unsmear._atomic import write_bytes_atomic
+from unsmear._plain_data import plain_data
 from unsmear.cli import _common
 from unsmear.flow_files import read_flow
 from unsmear.images import read_image
+from unsmear.suite import evaluate_suite, markdown
 
 if TYPE_CHECKING:
     import argparse
 
-SUMMARY = "compare a flow field with the truth, or two pictures"
-EXAMPLE = "unsmear evaluate flow.flo truth.flo --mask land.png"
+SUMMARY = "compare a flow field with the truth, methods on sequences, or two pictures"
+EXAMPLE = """unsmear evaluate flow.flo truth.flo --mask land.png
+  unsmear evaluate --suite sequences/ --methods balanced fast --rivals -o table"""
+_SUITE_SUFFIXES = (".md", ".json")
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
@@ -35,14 +43,45 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--images", nargs=2, metavar=("A", "B"), help="PSNR and SSIM of two pictures"
     )
+    suite = verb.add_argument_group("all methods on all sequences of a folder")
+    suite.add_argument(
+        "--suite",
+        metavar="DIR",
+        help="sequences with truth: pictures and flow files that end in numbers",
+    )
+    suite.add_argument(
+        "-o", "--output", metavar="OUT", help="write OUT.md and OUT.json"
+    )
+    suite.add_argument(
+        "--methods",
+        nargs="+",
+        metavar="M",
+        help="NAME or NAME:parameter=value,...; default all of ours",
+    )
+    suite.add_argument(
+        "--rivals",
+        action="store_true",
+        help='OpenCV and scikit-image too (pip install "unsmear[bench]")',
+    )
+    suite.add_argument(
+        "--runs",
+        type=int,
+        default=2,
+        metavar="N",
+        help="the shortest counts; default 2",
+    )
 
 
 def run(options: argparse.Namespace) -> None:
     """Compare and print."""
+    kinds = [bool(options.files), bool(options.images), bool(options.suite)]
+    if sum(kinds) > 1:
+        msg = "give one of FLOW TRUTH, --images A B and --suite DIR"
+        raise ValueError(msg)
+    if options.suite:
+        _run_suite(options)
+        return
     if options.images:
-        if options.files:
-            msg = "give FLOW TRUTH or --images A B, not both"
-            raise ValueError(msg)
         a, b = map(read_image, options.images)
         result: dict[str, Any] = {
             "psnr": metrics.psnr(a, b),
@@ -66,6 +105,26 @@ def run(options: argparse.Namespace) -> None:
             flow, confidence, truth, mask=mask
         )
     _common.show_result(result, as_json=options.json)
+
+
+def _run_suite(options: argparse.Namespace) -> None:
+    result = evaluate_suite(
+        options.suite,
+        methods=options.methods,
+        rivals=options.rivals,
+        runs=options.runs,
+        report=lambda line: print(line, file=sys.stderr),
+    )
+    plain = json.dumps(plain_data(result), indent=1) + "\n"
+    table = markdown(result)
+    if options.output:
+        output = Path(options.output)
+        if output.suffix in _SUITE_SUFFIXES:
+            output = output.with_suffix("")
+        for suffix, text in zip(_SUITE_SUFFIXES, (table, plain), strict=True):
+            path = output.with_name(output.name + suffix)
+            write_bytes_atomic(path, text.encode())
+    print(plain if options.json else table, end="")
 
 
 def _mask(options: argparse.Namespace, truth: Any) -> Any:

@@ -18,6 +18,7 @@ use super::evidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
 use super::still::{Rest, look_for_rest};
+use super::visible::{keep_what_rests, see};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
@@ -149,8 +150,8 @@ impl<'a> Level<'a> {
             &scaled
         };
         let mut warped = target.image.warp(along.view(), control)?;
-        keep_what_rests(&mut warped, picture, along);
-        see(along, coverage.as_ref(), &mut sight.visible);
+        keep_what_rests(&mut warped, picture, along, control)?;
+        see(along, coverage.as_ref(), &mut sight.visible, control)?;
         if let Some(coverage) = self.coverage {
             sight.visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
         }
@@ -249,32 +250,4 @@ fn mean_power(responses: &Responses<f32>) -> f64 {
         sum += f64::from(row);
     }
     sum / (filters * height * width) as f64
-}
-
-/// Puts the sample itself where nothing moves: the spline passes through it but for rounding, which
-/// would show as motion of frames at rest.
-fn keep_what_rests(warped: &mut Array2<f32>, picture: &Array2<f32>, flow: &FlowField<f32>) {
-    let moves = flow.u.iter().zip(&flow.v).map(|(u, v)| u.abs() + v.abs());
-    for ((warped, &sample), motion) in warped.iter_mut().zip(picture).zip(moves) {
-        *warped = if motion == 0.0 { sample } else { *warped };
-    }
-}
-
-/// Weights: 0 where the flow ends outside the picture, else the frame's coverage there (1 without).
-fn see(flow: &FlowField<f32>, coverage: Option<&Array2<f32>>, visible: &mut [f32]) {
-    let (height, width) = flow.dim();
-    let (right, bottom) = ((width - 1) as f32, (height - 1) as f32);
-    let rows = flow.u.rows().into_iter().zip(flow.v.rows());
-    for (y, ((u, v), out)) in rows.zip(visible.chunks_exact_mut(width)).enumerate() {
-        for (x, ((u, v), out)) in u.iter().zip(v).zip(out).enumerate() {
-            let (to_x, to_y) = (x as f32 + u, y as f32 + v);
-            let inside = (0.0..=right).contains(&to_x) && (0.0..=bottom).contains(&to_y);
-            *out = if inside { 1.0 } else { 0.0 };
-            if let Some(weights) = coverage
-                && inside
-            {
-                *out = weights[(to_y.round() as usize, to_x.round() as usize)];
-            }
-        }
-    }
 }

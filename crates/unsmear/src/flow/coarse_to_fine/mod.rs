@@ -40,6 +40,7 @@ mod refine;
 mod rows;
 mod schedule;
 mod still;
+mod visible;
 
 pub use frames::Sequence;
 pub use parameters::CoarseToFine;
