@@ -18,6 +18,7 @@ _BALANCED: dict[str, Any] = {
     "edge_sensitivity": 2.0,
     "strongest_channel": False,
     "residual_scale": 1.0,
+    "precision_scale": 0.25,
     "tau": 1.25,
     "amplitude_fraction": 0.05,
     "amplitude_floor": 0.2,

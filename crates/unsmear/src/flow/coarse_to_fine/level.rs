@@ -35,6 +35,7 @@ pub(super) struct Settings {
     pub(super) amplitude_fraction: f64,
     pub(super) amplitude_floor: f64,
     pub(super) residual: f32,
+    pub(super) precision: f32,
     pub(super) alpha: f32,
     pub(super) edges: EdgeRule,
     pub(super) passes: usize,

@@ -36,6 +36,7 @@ mod level;
 mod noise_rule;
 mod parameters;
 mod phase_constraint;
+mod precision;
 mod refine;
 mod rows;
 mod schedule;
@@ -150,6 +151,7 @@ impl CoarseToFine {
             amplitude_fraction: self.amplitude_fraction,
             amplitude_floor: self.amplitude_floor,
             residual: self.residual_scale as f32,
+            precision: self.precision_scale as f32,
             alpha: self.smoothness as f32,
             edges: EdgeRule {
                 sensitivity: self.edge_sensitivity,

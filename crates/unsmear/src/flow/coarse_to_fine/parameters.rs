@@ -31,6 +31,8 @@ pub struct CoarseToFine {
     pub strongest_channel: bool,
     /// Residual at which a constraint has half its weight, rad, > 0.
     pub residual_scale: f64,
+    /// Residual below which data count more by the inverse of its square, rad; 0 leaves this out.
+    pub precision_scale: f64,
     /// Deviation from the tuned frequency at which weights halve, in deviations of the filter, > 0.
     pub tau: f64,
     /// Amplitude at which weights halve, as a share of the rms amplitude of the level, >= 0...
@@ -67,6 +69,7 @@ impl CoarseToFine {
             edge_sensitivity: 2.0,
             strongest_channel: false,
             residual_scale: 1.0,
+            precision_scale: 0.25,
             tau: 1.25,
             amplitude_fraction: 0.05,
             amplitude_floor: 0.2,
@@ -140,6 +143,7 @@ impl CoarseToFine {
         }
         for (argument, value) in [
             ("edge_sensitivity", self.edge_sensitivity),
+            ("precision_scale", self.precision_scale),
             ("amplitude_fraction", self.amplitude_fraction),
         ] {
             require(argument, value, ">= 0", |x| x >= 0.0)?;
