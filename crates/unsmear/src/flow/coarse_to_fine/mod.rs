@@ -53,12 +53,11 @@ use frames::{FramePyramid, Plan};
 use guide::EdgeRule;
 use level::Settings;
 use noise_rule::adapt;
+use parameters::FOR_TWO_FRAMES;
 use schedule::{Climb, Summit, enlarge};
 
 /// Confidence of a flow that is known and deserves none.
 const LEAST_CONFIDENCE: f32 = 1e-6;
-/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
-const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
 
 impl CoarseToFine {
     /// Flow and confidence at the reference frame.

@@ -5,6 +5,9 @@
 
 use crate::error::{Result, require};
 
+/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
+pub(super) const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
+
 /// Parameters of [`super`]; lengths in px of the respective level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::struct_excessive_bools, reason = "independent switches, each on its own")]
@@ -65,11 +68,11 @@ impl CoarseToFine {
             finest_warps: 2,
             passes: 2,
             sweeps: 10,
-            smoothness: 0.1,
+            smoothness: 0.12,
             edge_sensitivity: 2.0,
             strongest_channel: false,
             residual_scale: 1.0,
-            precision_scale: 0.25,
+            precision_scale: 0.3,
             tau: 1.25,
             amplitude_fraction: 0.05,
             amplitude_floor: 0.2,
@@ -96,7 +99,7 @@ impl CoarseToFine {
             warps: 3,
             passes: 3,
             sweeps: 15,
-            smoothness: 0.11,
+            smoothness: 0.13,
             edge_sensitivity: 2.5,
             strongest_channel: true,
             residual_scale: 0.7,
@@ -107,13 +110,25 @@ impl CoarseToFine {
     /// Up to seven frames, for motion that is constant over them.
     #[must_use]
     pub fn steady() -> Self {
+        Self::several(Self::balanced())
+    }
+
+    /// Up to seven frames and finer steps between the levels: four times the time of [`Self::steady`].
+    #[must_use]
+    pub fn steady_accurate() -> Self {
+        Self::several(Self::accurate())
+    }
+
+    /// Several frames by the settings of two.
+    fn several(two: Self) -> Self {
+        let [smoothness, edge_sensitivity, residual_scale] = FOR_TWO_FRAMES;
         Self {
-            smoothness: 0.08,
-            edge_sensitivity: 1.0,
-            residual_scale: 0.5,
+            smoothness: two.smoothness / smoothness,
+            edge_sensitivity: two.edge_sensitivity / edge_sensitivity,
+            residual_scale: two.residual_scale / residual_scale,
             frames_each_side: 3,
             choose_frames: true,
-            ..Self::balanced()
+            ..two
         }
     }
 
