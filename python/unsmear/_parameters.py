@@ -28,6 +28,7 @@ _BALANCED: dict[str, Any] = {
     "choose_frames": False,
     "adapt_to_noise": True,
     "static_evidence": True,
+    "forward_backward": False,
 }
 
 _ACCURATE: dict[str, Any] = _BALANCED | {

@@ -30,6 +30,7 @@ pub(crate) struct Items {
     guide_sigma: f64,
     frames_each_side: usize,
     static_evidence: bool,
+    forward_backward: bool,
     adapt_to_noise: bool,
     choose_frames: bool,
 }
@@ -70,6 +71,7 @@ pub(crate) fn coarse_to_fine(
         guide_sigma: parameters.guide_sigma,
         frames_each_side: parameters.frames_each_side,
         static_evidence: parameters.static_evidence,
+        forward_backward: parameters.forward_backward,
         adapt_to_noise: parameters.adapt_to_noise,
         choose_frames: parameters.choose_frames,
     };

@@ -14,7 +14,7 @@
 use ndarray::Array2;
 
 use super::choice::{Explanation, Mismatch, mismatch};
-use super::evidence::add_coherence;
+use super::confidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
 use super::still::{Rest, look_for_rest};
@@ -209,7 +209,7 @@ impl<'a> Level<'a> {
         mismatch(&seen, control)
     }
 
-    /// Mean coherence of the frames at `flow`; see [`super::evidence`].
+    /// Mean coherence of the frames at `flow`; see [`super::confidence`].
     pub(super) fn coherence(
         &self,
         flow: &FlowField<f32>,

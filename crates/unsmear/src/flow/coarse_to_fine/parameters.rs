@@ -54,6 +54,8 @@ pub struct CoarseToFine {
     pub adapt_to_noise: bool,
     /// Hold still what the frames show to rest.
     pub static_evidence: bool,
+    /// Check the flow by that of the reversed frames: confidence alone, at twice the time.
+    pub forward_backward: bool,
 }
 
 impl CoarseToFine {
@@ -82,6 +84,7 @@ impl CoarseToFine {
             choose_frames: false,
             adapt_to_noise: true,
             static_evidence: true,
+            forward_backward: false,
         }
     }
 

@@ -42,9 +42,12 @@ const BOUNDARY: f32 = 0.1;
 /// Spatial deviation of the weighted median, in radii.
 const MEDIAN_SPREAD: f32 = 0.8;
 
-/// What a level adds: the flow, and the trace of its data term.
+/// What a level adds: the flow, and the data terms of its last warp.
 pub(super) struct Refined {
     pub(super) flow: FlowField<f32>,
+    /// The data terms, raised by precision.
+    pub(super) equations: NormalEquations,
+    /// Their trace before it was raised.
     pub(super) trace: Array2<f32>,
     /// Mean change of the flow by each warp, px of the level.
     pub(super) changes: Vec<f64>,
@@ -74,12 +77,12 @@ impl Level<'_> {
             changes.push(self.minimise(&mut flow, sights, &mut work, control)?);
             control.advance()?;
         }
-        let Work { equations: NormalEquations { a11, a22, .. }, gain, .. } = work;
+        let Work { equations, gain, .. } = work;
         let trace = Array2::from_shape_fn((self.height, self.width), |(y, x)| {
             let i = y * self.width + x;
-            (a11[i] + a22[i]) / gain[i]
+            (equations.a11[i] + equations.a22[i]) / gain[i]
         });
-        Ok(Refined { flow: self.sharpen(flow, control)?, trace, changes })
+        Ok(Refined { flow: self.sharpen(flow, control)?, equations, trace, changes })
     }
 
     /// Moves `flow` to the minimum of the energy within reach of one warp; returns the mean change, px.
