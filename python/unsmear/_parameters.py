@@ -14,10 +14,11 @@ _BALANCED: dict[str, Any] = {
     "finest_warps": 2,
     "passes": 2,
     "sweeps": 10,
-    "smoothness": 0.1,
+    "smoothness": 0.12,
     "edge_sensitivity": 2.0,
     "strongest_channel": False,
     "residual_scale": 1.0,
+    "precision_scale": 0.3,
     "tau": 1.25,
     "amplitude_fraction": 0.05,
     "amplitude_floor": 0.2,
@@ -27,30 +28,32 @@ _BALANCED: dict[str, Any] = {
     "choose_frames": False,
     "adapt_to_noise": True,
     "static_evidence": True,
+    "forward_backward": False,
 }
+
+_ACCURATE: dict[str, Any] = _BALANCED | {
+    "pyramid_factor": 0.75,
+    "warps": 3,
+    "passes": 3,
+    "sweeps": 15,
+    "smoothness": 0.13,
+    "edge_sensitivity": 2.5,
+    "strongest_channel": True,
+    "residual_scale": 0.7,
+}
+
+_SEVERAL_FRAMES: dict[str, Any] = {"frames_each_side": 3, "choose_frames": True}
 
 PARAMETERS: dict[str, dict[str, Any]] = {
     "fast": _BALANCED | {"finest_level": 1, "warps": 5},
     "balanced": _BALANCED,
-    "accurate": _BALANCED
-    | {
-        "pyramid_factor": 0.75,
-        "warps": 3,
-        "passes": 3,
-        "sweeps": 15,
-        "smoothness": 0.11,
-        "edge_sensitivity": 2.5,
-        "strongest_channel": True,
-        "residual_scale": 0.7,
-    },
+    "accurate": _ACCURATE,
     "steady": _BALANCED
-    | {
-        "smoothness": 0.08,
-        "edge_sensitivity": 1.0,
-        "residual_scale": 0.5,
-        "frames_each_side": 3,
-        "choose_frames": True,
-    },
+    | {"smoothness": 0.096, "edge_sensitivity": 1.0, "residual_scale": 0.5}
+    | _SEVERAL_FRAMES,
+    "steady-accurate": _ACCURATE
+    | {"smoothness": 0.104, "edge_sensitivity": 1.25, "residual_scale": 0.35}
+    | _SEVERAL_FRAMES,
     "least-squares": {
         "tuning_frequency": 0.12,
         "bandwidth_octaves": 0.8,

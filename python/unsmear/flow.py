@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FlowResult", "optical_flow"]
 
-_COARSE_TO_FINE = ("fast", "balanced", "accurate", "steady")
+_COARSE_TO_FINE = ("fast", "balanced", "accurate", "steady", "steady-accurate")
 _LEAST_FRAMES = {"least-squares": 2, "fleet-jepson": 3, "thesis": 2}
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["velocity_of_frame"]
 
 _FORWARD_METHODS = ("fast", "balanced", "accurate")
+_SYMMETRIC_METHODS = ("steady", "steady-accurate")
 
 
 def velocity_of_frame(
@@ -56,10 +57,10 @@ def velocity_of_frame(
     if count < 2:
         msg = f"frames must be at least 2 to show motion, got {count}"
         raise ValueError(msg)
-    if method not in (*_FORWARD_METHODS, "steady"):
+    if method not in (*_FORWARD_METHODS, *_SYMMETRIC_METHODS):
         result = optical_flow(frames, index=index, method=method, **options)
         return result.flow, result
-    if method == "steady" and index < count - 1:
+    if method in _SYMMETRIC_METHODS and index < count - 1:
         result = optical_flow(frames, index=index, method=method, **options)
         return result.flow, result
     ways = []

@@ -22,6 +22,7 @@ pub(crate) struct Items {
     edge_sensitivity: f64,
     strongest_channel: bool,
     residual_scale: f64,
+    precision_scale: f64,
     tau: f64,
     amplitude_fraction: f64,
     amplitude_floor: f64,
@@ -29,6 +30,7 @@ pub(crate) struct Items {
     guide_sigma: f64,
     frames_each_side: usize,
     static_evidence: bool,
+    forward_backward: bool,
     adapt_to_noise: bool,
     choose_frames: bool,
 }
@@ -61,6 +63,7 @@ pub(crate) fn coarse_to_fine(
         edge_sensitivity: parameters.edge_sensitivity,
         strongest_channel: parameters.strongest_channel,
         residual_scale: parameters.residual_scale,
+        precision_scale: parameters.precision_scale,
         tau: parameters.tau,
         amplitude_fraction: parameters.amplitude_fraction,
         amplitude_floor: parameters.amplitude_floor,
@@ -68,6 +71,7 @@ pub(crate) fn coarse_to_fine(
         guide_sigma: parameters.guide_sigma,
         frames_each_side: parameters.frames_each_side,
         static_evidence: parameters.static_evidence,
+        forward_backward: parameters.forward_backward,
         adapt_to_noise: parameters.adapt_to_noise,
         choose_frames: parameters.choose_frames,
     };

@@ -14,7 +14,7 @@
 use ndarray::Array2;
 
 use super::choice::{Explanation, Mismatch, mismatch};
-use super::evidence::add_coherence;
+use super::confidence::add_coherence;
 use super::guide::{EdgeRule, edge_weights, median_guide};
 use super::phase_constraint::{TERMS, Weighting, constrain};
 use super::still::{Rest, look_for_rest};
@@ -36,6 +36,7 @@ pub(super) struct Settings {
     pub(super) amplitude_fraction: f64,
     pub(super) amplitude_floor: f64,
     pub(super) residual: f32,
+    pub(super) precision: f32,
     pub(super) alpha: f32,
     pub(super) edges: EdgeRule,
     pub(super) passes: usize,
@@ -209,7 +210,7 @@ impl<'a> Level<'a> {
         mismatch(&seen, control)
     }
 
-    /// Mean coherence of the frames at `flow`; see [`super::evidence`].
+    /// Mean coherence of the frames at `flow`; see [`super::confidence`].
     pub(super) fn coherence(
         &self,
         flow: &FlowField<f32>,

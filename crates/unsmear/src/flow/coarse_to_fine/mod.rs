@@ -13,7 +13,7 @@
 //! things that move far are missed. Frames beyond two assume constant motion.
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
 
-use ndarray::{Array2, Zip};
+use ndarray::{Array2, Zip, s};
 
 use crate::control::Control;
 use crate::error::Result;
@@ -25,6 +25,7 @@ use crate::pyramid::{Resampling, level_sizes, resample};
 mod arctangent;
 mod boundary;
 mod choice;
+mod confidence;
 mod contrast;
 mod data_term;
 mod diffusivity;
@@ -36,7 +37,9 @@ mod level;
 mod noise_rule;
 mod parameters;
 mod phase_constraint;
+mod precision;
 mod refine;
+mod round_trip;
 mod rows;
 mod schedule;
 mod still;
@@ -53,12 +56,12 @@ use frames::{FramePyramid, Plan};
 use guide::EdgeRule;
 use level::Settings;
 use noise_rule::adapt;
+use parameters::FOR_TWO_FRAMES;
+use round_trip::check_round_trip;
 use schedule::{Climb, Summit, enlarge};
 
 /// Confidence of a flow that is known and deserves none.
 const LEAST_CONFIDENCE: f32 = 1e-6;
-/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
-const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
 
 impl CoarseToFine {
     /// Flow and confidence at the reference frame.
@@ -80,8 +83,42 @@ impl CoarseToFine {
         sequence: &Sequence<'_>,
         control: &Control,
     ) -> Result<(Estimate<f32>, Vec<LevelTrace>)> {
-        let mut settings = self.settings()?;
         let (count, height, width) = sequence.check()?;
+        self.check()?;
+        let reversed = Sequence {
+            frames: sequence.frames.slice_move(s![..;-1, .., ..]),
+            index: count - 2 - sequence.index,
+            guide: None,
+            ..*sequence
+        };
+        let ways = [*sequence, reversed];
+        let ways = &ways[..1 + usize::from(self.forward_backward)];
+        control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
+        let (mut estimate, levels) = self.one_way(sequence, control)?;
+        for way in &ways[1..] {
+            let (back, _) = self.one_way(way, control)?;
+            check_round_trip(&mut estimate, &back.flow, control)?;
+        }
+        Ok((estimate, levels))
+    }
+
+    /// Number of warps, the unit of progress.
+    fn steps(&self, sequence: &Sequence<'_>, size: (usize, usize)) -> usize {
+        let sizes = level_sizes(size, self.pyramid_factor, self.coarsest_side);
+        let finest = self.finest_level.min(sizes.len() - 1);
+        let others = self.offsets(sequence.index, sequence.frames.dim().0).len();
+        let climbs = 1 + usize::from(self.choose_frames && others > 1);
+        climbs * (finest..sizes.len()).map(|level| self.warps_at(level)).sum::<usize>()
+    }
+
+    /// The flow of the frames in the order given.
+    fn one_way(
+        &self,
+        sequence: &Sequence<'_>,
+        control: &Control,
+    ) -> Result<(Estimate<f32>, Vec<LevelTrace>)> {
+        let mut settings = self.settings()?;
+        let (count, height, width) = sequence.frames.dim();
         let sizes = level_sizes((height, width), self.pyramid_factor, self.coarsest_side);
         let contrast = Contrast::measure(sequence.frames);
         if contrast.is_blank() {
@@ -114,7 +151,6 @@ impl CoarseToFine {
         let summit = if self.choose_frames {
             choose(&climb, &others, control)?
         } else {
-            control.expect(climb.steps());
             climb.run(&others, control)?
         };
         Ok((descend(&summit, (height, width), control)?, summit.levels))
@@ -137,7 +173,6 @@ impl CoarseToFine {
     }
 
     fn settings(&self) -> Result<Settings> {
-        self.check()?;
         let gabor = GaborParameters {
             tuning_frequency: 0.25,
             bandwidth_octaves: 1.6,
@@ -151,6 +186,7 @@ impl CoarseToFine {
             amplitude_fraction: self.amplitude_fraction,
             amplitude_floor: self.amplitude_floor,
             residual: self.residual_scale as f32,
+            precision: self.precision_scale as f32,
             alpha: self.smoothness as f32,
             edges: EdgeRule {
                 sensitivity: self.edge_sensitivity,
@@ -176,10 +212,8 @@ fn choose(climb: &Climb<'_>, others: &[&FramePyramid], control: &Control) -> Res
     settings.residual *= residual as f32;
     let of_two = Climb { settings: &settings, ..*climb };
     if others.len() == next.len() {
-        control.expect(of_two.steps());
         return of_two.run(&next, control);
     }
-    control.expect(of_two.steps() + climb.steps());
     let two = of_two.run(&next, control)?;
     let several = climb.run(others, control)?;
     let hold = climb.at(climb.finest, &next, control, |level| {

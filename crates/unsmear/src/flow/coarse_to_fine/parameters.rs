@@ -5,6 +5,9 @@
 
 use crate::error::{Result, require};
 
+/// What two frames want of the smoothness, the edges and the residual scale that seven frames want.
+pub(super) const FOR_TWO_FRAMES: [f64; 3] = [1.25, 2.0, 2.0];
+
 /// Parameters of [`super`]; lengths in px of the respective level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::struct_excessive_bools, reason = "independent switches, each on its own")]
@@ -31,6 +34,8 @@ pub struct CoarseToFine {
     pub strongest_channel: bool,
     /// Residual at which a constraint has half its weight, rad, > 0.
     pub residual_scale: f64,
+    /// Residual below which data count more by the inverse of its square, rad; 0 leaves this out.
+    pub precision_scale: f64,
     /// Deviation from the tuned frequency at which weights halve, in deviations of the filter, > 0.
     pub tau: f64,
     /// Amplitude at which weights halve, as a share of the rms amplitude of the level, >= 0...
@@ -49,6 +54,8 @@ pub struct CoarseToFine {
     pub adapt_to_noise: bool,
     /// Hold still what the frames show to rest.
     pub static_evidence: bool,
+    /// Check the flow by that of the reversed frames: confidence alone, at twice the time.
+    pub forward_backward: bool,
 }
 
 impl CoarseToFine {
@@ -63,10 +70,11 @@ impl CoarseToFine {
             finest_warps: 2,
             passes: 2,
             sweeps: 10,
-            smoothness: 0.1,
+            smoothness: 0.12,
             edge_sensitivity: 2.0,
             strongest_channel: false,
             residual_scale: 1.0,
+            precision_scale: 0.3,
             tau: 1.25,
             amplitude_fraction: 0.05,
             amplitude_floor: 0.2,
@@ -76,6 +84,7 @@ impl CoarseToFine {
             choose_frames: false,
             adapt_to_noise: true,
             static_evidence: true,
+            forward_backward: false,
         }
     }
 
@@ -93,7 +102,7 @@ impl CoarseToFine {
             warps: 3,
             passes: 3,
             sweeps: 15,
-            smoothness: 0.11,
+            smoothness: 0.13,
             edge_sensitivity: 2.5,
             strongest_channel: true,
             residual_scale: 0.7,
@@ -104,13 +113,25 @@ impl CoarseToFine {
     /// Up to seven frames, for motion that is constant over them.
     #[must_use]
     pub fn steady() -> Self {
+        Self::several(Self::balanced())
+    }
+
+    /// Up to seven frames and finer steps between the levels: four times the time of [`Self::steady`].
+    #[must_use]
+    pub fn steady_accurate() -> Self {
+        Self::several(Self::accurate())
+    }
+
+    /// Several frames by the settings of two.
+    fn several(two: Self) -> Self {
+        let [smoothness, edge_sensitivity, residual_scale] = FOR_TWO_FRAMES;
         Self {
-            smoothness: 0.08,
-            edge_sensitivity: 1.0,
-            residual_scale: 0.5,
+            smoothness: two.smoothness / smoothness,
+            edge_sensitivity: two.edge_sensitivity / edge_sensitivity,
+            residual_scale: two.residual_scale / residual_scale,
             frames_each_side: 3,
             choose_frames: true,
-            ..Self::balanced()
+            ..two
         }
     }
 
@@ -140,6 +161,7 @@ impl CoarseToFine {
         }
         for (argument, value) in [
             ("edge_sensitivity", self.edge_sensitivity),
+            ("precision_scale", self.precision_scale),
             ("amplitude_fraction", self.amplitude_fraction),
         ] {
             require(argument, value, ">= 0", |x| x >= 0.0)?;

@@ -12,6 +12,8 @@
 //! [`LARGEST_INCREMENT`], within which phase does not wrap; a 5 x 5 median follows. After the last
 //! warp a weighted median, guided by the picture, sharpens the motion boundaries.
 //!
+//! Where phase proves precise the data count more (see [`super::precision`]).
+//!
 //! Reference: T. Brox, A. Bruhn, N. Papenberg, J. Weickert 2004 (doi 10.1007/978-3-540-24673-2_3)
 //! for warping with lagged weights; D. Sun, S. Roth, M. J. Black 2014 (doi
 //! 10.1007/s11263-013-0644-x) for the medians.
@@ -22,6 +24,8 @@ use super::boundary::boundaries;
 use super::data_term::{NormalEquations, Reweighting, accumulate};
 use super::diffusivity::diffusivities;
 use super::level::{Level, Settings, Sight};
+use super::precision::precision;
+use super::rows::for_each_rows;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -38,9 +42,12 @@ const BOUNDARY: f32 = 0.1;
 /// Spatial deviation of the weighted median, in radii.
 const MEDIAN_SPREAD: f32 = 0.8;
 
-/// What a level adds: the flow, and the trace of its data term.
+/// What a level adds: the flow, and the data terms of its last warp.
 pub(super) struct Refined {
     pub(super) flow: FlowField<f32>,
+    /// The data terms, raised by precision.
+    pub(super) equations: NormalEquations,
+    /// Their trace before it was raised.
     pub(super) trace: Array2<f32>,
     /// Mean change of the flow by each warp, px of the level.
     pub(super) changes: Vec<f64>,
@@ -70,12 +77,12 @@ impl Level<'_> {
             changes.push(self.minimise(&mut flow, sights, &mut work, control)?);
             control.advance()?;
         }
-        let Work { equations: NormalEquations { a11, a22, .. }, .. } = work;
+        let Work { equations, gain, .. } = work;
         let trace = Array2::from_shape_fn((self.height, self.width), |(y, x)| {
             let i = y * self.width + x;
-            a11[i] + a22[i]
+            (equations.a11[i] + equations.a22[i]) / gain[i]
         });
-        Ok(Refined { flow: self.sharpen(flow, control)?, trace, changes })
+        Ok(Refined { flow: self.sharpen(flow, control)?, equations, trace, changes })
     }
 
     /// Moves `flow` to the minimum of the energy within reach of one warp; returns the mean change, px.
@@ -93,6 +100,10 @@ impl Level<'_> {
         let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
         let constraints: Vec<&[f32]> = sights.iter().map(|sight| &sight.constraints[..]).collect();
         let edges = [&self.edges[0][..], &self.edges[1][..]];
+        if self.settings.precision > 0.0 {
+            let gain = &mut work.gain;
+            precision(&constraints, self.width, self.settings.precision, scale, gain, control)?;
+        }
         for _ in 0..passes {
             accumulate(
                 &constraints,
@@ -103,7 +114,7 @@ impl Level<'_> {
                 &mut work.equations,
                 control,
             )?;
-            add_springs(&work.springs, &mut work.equations);
+            weigh(work, self.width, control)?;
             let between = [&mut work.gx[..], &mut work.gy[..]];
             diffusivities([&u, &v], edges, alpha, between, self.width, control)?;
             let system = SorSystem {
@@ -169,6 +180,8 @@ struct Work {
     equations: NormalEquations,
     /// Pull towards rest, added to the diagonal; see [`super::still`].
     springs: Vec<f32>,
+    /// Factor of the data; see [`super::precision`].
+    gain: Vec<f32>,
     gx: Vec<f32>,
     gy: Vec<f32>,
     sor: SorScratch,
@@ -180,6 +193,7 @@ impl Work {
         Self {
             equations: NormalEquations::zeros(samples),
             springs: vec![0.0; samples],
+            gain: vec![1.0; samples],
             gx: vec![0.0; samples],
             gy: vec![0.0; samples],
             sor: SorScratch::default(),
@@ -187,9 +201,20 @@ impl Work {
     }
 }
 
-/// Springs to zero motion: they add to the matrix and, their rest being 0, nothing to the right-hand side.
-fn add_springs(springs: &[f32], equations: &mut NormalEquations) {
-    for diagonal in [&mut equations.a11, &mut equations.a22] {
-        diagonal.iter_mut().zip(springs).for_each(|(a, s)| *a += s);
-    }
+/// Adds the springs, which act on the matrix alone as their rest is 0, and multiplies all by the gain.
+fn weigh(work: &mut Work, width: usize, control: &Control) -> Result<()> {
+    let Work { equations: NormalEquations { a11, a12, a22, c1, c2 }, springs, gain, .. } = work;
+    let planes = [&mut a11[..], &mut a12[..], &mut a22[..], &mut c1[..], &mut c2[..]];
+    for_each_rows(planes, [width; 5], control, |y, rows| {
+        let row = y * width..(y + 1) * width;
+        let (springs, gain) = (&springs[row.clone()], &gain[row]);
+        let [a11, a12, a22, c1, c2] = rows;
+        for diagonal in [a11, a22] {
+            let terms = diagonal.iter_mut().zip(springs).zip(gain);
+            terms.for_each(|((a, spring), g)| *a = (*a + spring) * g);
+        }
+        for plane in [a12, c1, c2] {
+            plane.iter_mut().zip(gain).for_each(|(term, g)| *term *= g);
+        }
+    })
 }

@@ -9,7 +9,8 @@
 
 use ndarray::Array2;
 
-use super::evidence::{confidence, gather};
+use super::confidence::{Clues, confidence};
+use super::evidence::gather;
 use super::frames::FramePyramid;
 use super::level::{Level, Settings};
 use super::still::spring;
@@ -58,11 +59,6 @@ pub(super) struct Summit {
 }
 
 impl Climb<'_> {
-    /// Number of warps, the unit of progress.
-    pub(super) fn steps(&self) -> usize {
-        self.warps[self.finest..].iter().sum()
-    }
-
     /// The flow between the reference and `others`.
     ///
     /// # Errors
@@ -75,7 +71,6 @@ impl Climb<'_> {
             flow = enlarge(&flow, size, control)?;
             self.at(level, others, control, |prepared| {
                 let mut pull = 0.0;
-                let start = FlowField { u: flow.u.clone(), v: flow.v.clone() };
                 let mut springs = None;
                 let mut sights: Vec<_> = others.iter().map(|_| prepared.sight()).collect();
                 if let Some(rest) = prepared.look_for_rest(&mut sights[0], control)? {
@@ -84,9 +79,13 @@ impl Climb<'_> {
                     springs = Some(spring);
                     resting.push((prepared.zoom, rest.rest));
                 }
-                let refined =
-                    prepared.refine(start, self.warps[level], springs, &mut sights, control)?;
-                flow = refined.flow;
+                let refined = prepared.refine(
+                    flow.clone(),
+                    self.warps[level],
+                    springs,
+                    &mut sights,
+                    control,
+                )?;
                 levels.push(LevelTrace {
                     frames: others.len(),
                     size,
@@ -98,9 +97,18 @@ impl Climb<'_> {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
                 }
                 if level == self.finest {
-                    let coherence = prepared.coherence(&flow, &mut sights[0], control)?;
-                    trust = Some(confidence(&coherence, &flow, control)?);
+                    let coherence = prepared.coherence(&refined.flow, &mut sights[0], control)?;
+                    let equations = &refined.equations;
+                    let clues = Clues {
+                        coherence: &coherence,
+                        flow: &refined.flow,
+                        coarser: (level + 1 < self.sizes.len()).then_some(&flow),
+                        zoom: prepared.zoom,
+                        matrix: [&equations.a11, &equations.a12, &equations.a22],
+                    };
+                    trust = Some(confidence(&clues, control)?);
                 }
+                flow = refined.flow;
                 Ok(())
             })?;
         }
