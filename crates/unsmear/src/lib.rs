@@ -32,6 +32,9 @@
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
+//! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
+//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::scalar` | parts of the operator; one kernel for the whole picture |
+//! | 13 | [`motion_operator`] | blur along the path of every pixel |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
@@ -59,9 +62,13 @@ pub mod fourier;
 pub mod gabor;
 pub mod immerkaer_noise;
 pub mod interpolate;
+pub mod kernel_operator;
+pub mod linear_operator;
 mod local_spline;
 pub mod median;
 pub mod metrics;
+pub mod motion_operator;
+pub mod motion_path;
 pub mod noise;
 pub mod phase_gradient;
 pub mod phase_rate;
@@ -80,4 +87,5 @@ pub use convolve::{correlate_axis, correlate_separable, gaussian_taps};
 pub use error::{Error, Result};
 pub use flow_field::{FlowField, FlowView};
 pub use interpolate::{SplineDegree, SplineImage};
+pub use linear_operator::LinearOperator;
 pub use real::Real;
