@@ -35,10 +35,15 @@
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
 //! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::scalar` | parts of the operator; one kernel for the whole picture |
 //! | 13 | [`motion_operator`] | blur along the path of every pixel |
-//! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
+//! | 13 | `deblur::inverse_kernel`, `deblur::detail`, `deblur::vectors`, `deblur::smoothness`, `deblur::half_size`, `deblur::grey_levels`, `deblur::occlusion`, `deblur::datum` | parts of the deblurring methods |
+//! | 14 | `deblur::conjugate_gradient`, `deblur::structure`, `deblur::look`, `deblur::preparation` | |
+//! | 15 | `deblur::variational` | data and prior, reweighted |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
-//! | 15 | [`deblur`] | their names |
-//! | 16 | [`metrics`] | how far an estimate is from the truth |
+//! | 16 | `deblur::total_variation` | |
+//! | 17 | `deblur::tikhonov`, `deblur::richardson_lucy` | |
+//! | 18 | `deblur::motion_deblur` | any of them on one picture |
+//! | 19 | [`deblur`] | their names |
+//! | 20 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.
