@@ -33,8 +33,11 @@
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
-//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::scalar` | parts of the operator; one kernel for the whole picture |
-//! | 13 | [`motion_operator`] | blur along the path of every pixel |
+//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::lanes` | parts of the operator; one kernel for the whole picture |
+//! | 13 | `motion_operator::plan` | |
+//! | 14 | `motion_operator::expand` | |
+//! | 15 | `motion_operator::sweep` | |
+//! | 16 | [`motion_operator`] | blur along the path of every pixel |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
