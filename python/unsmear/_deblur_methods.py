@@ -48,7 +48,9 @@ def variational(
         method,
         exposure,
         acceleration=(
-            None if acceleration is None else channels.flow(acceleration, "acceleration")
+            None
+            if acceleration is None
+            else channels.flow(acceleration, "acceleration")
         ),
         weights=None if weights is None else channels.weights(weights),
         noise=None if noise is None else float(noise) / channels.scale,
@@ -139,6 +141,12 @@ def warnings_of(report: dict[str, Any]) -> list[str]:
         warnings.append(
             "the founding method makes pictures worse and blackens their border; "
             "it is kept for reference"
+        )
+    if report.get("model_mismatch"):
+        warnings.append(
+            f"what the motion leaves unexplained is {report['mismatch']:.2f} times the "
+            "noise: flow or exposure are wrong somewhere, and the picture was restored "
+            "with more caution"
         )
     unknown = report["unknown_pixels"]
     if unknown > COPIED_SHARE_WORTH_A_WARNING * report["pixels"]:
