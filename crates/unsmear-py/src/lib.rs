@@ -9,6 +9,7 @@ mod component_velocity;
 mod convolve;
 mod deblur;
 mod errors;
+mod exposure;
 mod flow;
 mod interpolate;
 mod metrics;
@@ -33,6 +34,8 @@ mod _unsmear {
     use crate::convolve::correlate_separable;
     #[pymodule_export]
     use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
+    #[pymodule_export]
+    use crate::exposure::estimate_exposure;
     #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
     #[pymodule_export]

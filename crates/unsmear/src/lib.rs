@@ -32,6 +32,12 @@
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
+//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random` | parts of the search for the exposure |
+//! | 13 | `exposure::tile` | |
+//! | 14 | `exposure::tile_choice`, `exposure::likelihood` | |
+//! | 15 | `exposure::vote` | |
+//! | 16 | `exposure::search` | |
+//! | 17 | [`exposure`] | how long the shutter was open |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
@@ -52,6 +58,7 @@ pub mod deblur;
 mod demodulation;
 pub mod error;
 mod even_odd;
+pub mod exposure;
 pub mod fft_convolve;
 pub mod flow;
 pub mod flow_field;
