@@ -8,6 +8,7 @@ from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
 from unsmear.deblur import DeblurResult, deblur
 from unsmear.demo_clip import DemoClip, demo_clip
+from unsmear.exposure import ExposureEstimate, estimate_exposure
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
@@ -18,6 +19,7 @@ __all__ = [
     "ComponentVelocities",
     "DeblurResult",
     "DemoClip",
+    "ExposureEstimate",
     "FlowFileError",
     "FlowResult",
     "__version__",
@@ -25,6 +27,7 @@ __all__ = [
     "component_velocities",
     "deblur",
     "demo_clip",
+    "estimate_exposure",
     "fspecial_motion",
     "get_num_threads",
     "metrics",

@@ -209,6 +209,27 @@ def thesis_deblur(
     progress: _Progress | None = None,
 ) -> tuple[_Double, int]: ...
 
+# How long the shutter was open.
+
+class _Exposure(TypedDict):
+    value: float
+    status: Literal["ok", "unsure", "small"]
+    vote: float
+    spread: float
+    tiles: int
+    likeliest: float
+    noise: float
+
+def estimate_exposure(
+    images: _Single,
+    velocities: _Single,
+    accelerations: _Single | None,
+    limits: tuple[float, float],
+    noise: float | None,
+    seed: int,
+    progress: _Progress | None = None,
+) -> _Exposure: ...
+
 # Metrics.
 
 def error_map(name: str, flow: _Double, truth: _Double) -> _Double: ...

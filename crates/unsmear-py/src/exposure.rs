@@ -7,45 +7,47 @@ use numpy::{PyReadonlyArray3, PyReadonlyArray4};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use unsmear::exposure::{ExposureFrame, ExposureSearch, ExposureStatus};
-use unsmear::{Control, FlowView, Result};
+use unsmear::motion_path::MotionPaths;
+use unsmear::{Control, FlowField, Result};
 
 use crate::threads;
 
-fn field<'a>(field: ArrayView3<'a, f32>) -> Result<FlowView<'a, f32>> {
-    let part = |part| {
-        let mut view = field;
-        view.collapse_axis(Axis(2), part);
-        view.index_axis_move(Axis(2), 0)
-    };
-    FlowView::new(part(0), part(1))
+fn field(both: ArrayView3<'_, f32>) -> Result<FlowField<f32>> {
+    FlowField::new(both.index_axis(Axis(2), 0).to_owned(), both.index_axis(Axis(2), 1).to_owned())
 }
 
 /// See `unsmear.estimate_exposure`.
 #[pyfunction]
-#[pyo3(signature = (images, velocities, curvatures, range, noise, seed, progress=None))]
+#[pyo3(signature = (images, velocities, accelerations, limits, noise, seed, progress=None))]
 pub(crate) fn estimate_exposure<'py>(
     py: Python<'py>,
     images: PyReadonlyArray3<'py, f32>,
     velocities: PyReadonlyArray4<'py, f32>,
-    curvatures: PyReadonlyArray4<'py, f32>,
-    range: (f64, f64),
-    noise: f64,
+    accelerations: Option<PyReadonlyArray4<'py, f32>>,
+    limits: (f64, f64),
+    noise: Option<f64>,
     seed: u64,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (images, velocities) = (images.as_array(), velocities.as_array());
-    let curvatures = curvatures.as_array();
+    let accelerations = accelerations.as_ref().map(|fields| fields.as_array());
     let found = threads::run(py, progress, |control: &Control| {
-        let fields = velocities.outer_iter().zip(curvatures.outer_iter());
-        let frames = images
+        let paths = velocities.outer_iter().enumerate().map(|(n, velocity)| {
+            let acceleration =
+                accelerations.map(|fields| field(fields.index_axis_move(Axis(0), n))).transpose()?;
+            MotionPaths::new(&field(velocity)?, 1.0, acceleration.as_ref())
+        });
+        let paths = paths.collect::<Result<Vec<_>>>()?;
+        let frames: Vec<_> = images
             .outer_iter()
-            .zip(fields)
-            .map(|(image, (velocity, curvature))| {
-                let (velocity, curvature) = (field(velocity)?, field(curvature)?);
-                Ok(ExposureFrame { image, velocity, curvature })
+            .zip(&paths)
+            .map(|(image, paths)| ExposureFrame {
+                image,
+                velocity: paths.velocity.view(),
+                curvature: paths.curvature.view(),
             })
-            .collect::<Result<Vec<_>>>()?;
-        ExposureSearch { range, noise, seed }.estimate(&frames, control)
+            .collect();
+        ExposureSearch { range: limits, noise, seed }.estimate(&frames, control)
     })?;
     let report = PyDict::new(py);
     report.set_item("value", found.value)?;
@@ -59,5 +61,6 @@ pub(crate) fn estimate_exposure<'py>(
     report.set_item("spread", found.spread)?;
     report.set_item("tiles", found.tiles)?;
     report.set_item("likeliest", found.likeliest)?;
+    report.set_item("noise", found.noise)?;
     Ok(report)
 }

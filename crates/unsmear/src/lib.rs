@@ -38,6 +38,9 @@
 //! | 15 | `exposure::vote` | |
 //! | 16 | `exposure::search` | |
 //! | 17 | [`exposure`] | how long the shutter was open |
+//! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
+//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::scalar` | parts of the operator; one kernel for the whole picture |
+//! | 13 | [`motion_operator`] | blur along the path of every pixel |
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
@@ -66,9 +69,13 @@ pub mod fourier;
 pub mod gabor;
 pub mod immerkaer_noise;
 pub mod interpolate;
+pub mod kernel_operator;
+pub mod linear_operator;
 mod local_spline;
 pub mod median;
 pub mod metrics;
+pub mod motion_operator;
+pub mod motion_path;
 pub mod noise;
 pub mod phase_gradient;
 pub mod phase_rate;
@@ -87,4 +94,5 @@ pub use convolve::{correlate_axis, correlate_separable, gaussian_taps};
 pub use error::{Error, Result};
 pub use flow_field::{FlowField, FlowView};
 pub use interpolate::{SplineDegree, SplineImage};
+pub use linear_operator::LinearOperator;
 pub use real::Real;
