@@ -33,8 +33,9 @@ pub(crate) fn estimate_exposure<'py>(
     let accelerations = accelerations.as_ref().map(|fields| fields.as_array());
     let found = threads::run(py, progress, |control: &Control| {
         let paths = velocities.outer_iter().enumerate().map(|(n, velocity)| {
-            let acceleration =
-                accelerations.map(|fields| field(fields.index_axis_move(Axis(0), n))).transpose()?;
+            let acceleration = accelerations
+                .map(|fields| field(fields.index_axis_move(Axis(0), n)))
+                .transpose()?;
             MotionPaths::new(&field(velocity)?, 1.0, acceleration.as_ref())
         });
         let paths = paths.collect::<Result<Vec<_>>>()?;
