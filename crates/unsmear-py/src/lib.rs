@@ -15,6 +15,7 @@ mod interpolate;
 mod metrics;
 mod parameters;
 mod psf;
+mod restoration;
 mod thesis;
 mod threads;
 
@@ -44,6 +45,10 @@ mod _unsmear {
     use crate::metrics::{error_map, psnr, ssim};
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
+    #[pymodule_export]
+    use crate::restoration::{
+        dilated, frame_motion, looks_reach, record_look, regions, restore_looks, visibility,
+    };
     #[pymodule_export]
     use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]

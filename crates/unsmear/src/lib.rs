@@ -44,6 +44,8 @@
 //! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
 //! | 15 | [`deblur`] | their names |
+//! | 16 | `restoration::frame_motion`, `restoration::regions`, `restoration::walk` | parts of the restoration of clips |
+//! | 17 | [`restoration`] | their names |
 //! | 16 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
@@ -82,6 +84,7 @@ pub mod phase_rate;
 pub mod psf;
 pub mod pyramid;
 pub mod real;
+pub mod restoration;
 pub mod sor;
 pub mod spatiotemporal;
 mod spline_filter;
