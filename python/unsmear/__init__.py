@@ -13,6 +13,7 @@ from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
 from unsmear.psf import fspecial_motion, motion_psf
+from unsmear.sequence import SequenceResult, deblur_sequence
 from unsmear.sequences import read_frames, write_frames
 
 __all__ = [
@@ -22,10 +23,12 @@ __all__ = [
     "ExposureEstimate",
     "FlowFileError",
     "FlowResult",
+    "SequenceResult",
     "__version__",
     "blur",
     "component_velocities",
     "deblur",
+    "deblur_sequence",
     "demo_clip",
     "estimate_exposure",
     "fspecial_motion",

@@ -227,8 +227,40 @@ def estimate_exposure(
     limits: tuple[float, float],
     noise: float | None,
     seed: int,
+    of_content: bool = False,
     progress: _Progress | None = None,
 ) -> _Exposure: ...
+
+# Parts of the restoration of clips.
+
+class _Look(TypedDict):
+    planes: _Single
+    weights: _Single
+    velocity: _Single
+    acceleration: _Single
+    offset: _Single | None
+    exposure: float
+
+def looks_reach(looks: Sequence[_Look]) -> int: ...
+def restore_looks(
+    looks: Sequence[_Look],
+    pad: int,
+    lambdas: Sequence[float],
+    robust: float,
+    first: tuple[int, int],
+    next: tuple[int, int],
+    start: _Single | None = None,
+    progress: _Progress | None = None,
+) -> tuple[list[_Single], list[float]]: ...
+def record_look(look: _Look, x: _Single, pad: int) -> _Single: ...
+def frame_motion(
+    forward: _Single | None = None,
+    backward: _Single | None = None,
+    acceleration: _Single | None = None,
+) -> tuple[_Single, _Single]: ...
+def visibility(velocity: _Single, exposure: float) -> _Single: ...
+def regions(mask: NDArray[np.bool_]) -> tuple[NDArray[np.uint32], int]: ...
+def dilated(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]: ...
 
 # Metrics.
 

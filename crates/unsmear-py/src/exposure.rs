@@ -16,9 +16,9 @@ fn field(both: ArrayView3<'_, f32>) -> Result<FlowField<f32>> {
     FlowField::new(both.index_axis(Axis(2), 0).to_owned(), both.index_axis(Axis(2), 1).to_owned())
 }
 
-/// See `unsmear.estimate_exposure`.
+/// See `unsmear.estimate_exposure`; with `of_content` the accelerations are those that the moving content feels.
 #[pyfunction]
-#[pyo3(signature = (images, velocities, accelerations, limits, noise, seed, progress=None))]
+#[pyo3(signature = (images, velocities, accelerations, limits, noise, seed, of_content=false, progress=None))]
 pub(crate) fn estimate_exposure<'py>(
     py: Python<'py>,
     images: PyReadonlyArray3<'py, f32>,
@@ -27,6 +27,7 @@ pub(crate) fn estimate_exposure<'py>(
     limits: (f64, f64),
     noise: Option<f64>,
     seed: u64,
+    of_content: bool,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (images, velocities) = (images.as_array(), velocities.as_array());
@@ -36,7 +37,12 @@ pub(crate) fn estimate_exposure<'py>(
             let acceleration = accelerations
                 .map(|fields| field(fields.index_axis_move(Axis(0), n)))
                 .transpose()?;
-            MotionPaths::new(&field(velocity)?, 1.0, acceleration.as_ref())
+            match acceleration {
+                Some(acceleration) if of_content => {
+                    MotionPaths::from_content_acceleration(&field(velocity)?, 1.0, &acceleration)
+                }
+                acceleration => MotionPaths::new(&field(velocity)?, 1.0, acceleration.as_ref()),
+            }
         });
         let paths = paths.collect::<Result<Vec<_>>>()?;
         let frames: Vec<_> = images
