@@ -15,6 +15,7 @@ from unsmear._arrays import (
     as_floating,
     as_flow,
     as_picture_array,
+    as_real_array,
     move_channels_last,
     require_ndim,
     scale_of,
@@ -73,17 +74,34 @@ class Channels:
         else:
             self.array = as_floating(planes, "image", np.float64)
 
-    def flow(self, flow: ArrayLike) -> NDArray[Any]:
+    def flow(self, flow: ArrayLike, argument: str = "flow") -> NDArray[Any]:
         """Return ``flow`` checked against the picture, in the picture's precision."""
         height, width = self.array.shape[1:]
-        checked = as_flow(flow)
+        checked = as_flow(flow, argument)
         if checked.shape[:2] != (height, width):
             msg = (
-                f"flow must have shape ({height}, {width}, 2) like image, "
+                f"{argument} must have shape ({height}, {width}, 2) like image, "
                 f"got {checked.shape}"
             )
             raise ValueError(msg)
         return checked.astype(self.array.dtype, copy=False)
+
+    def weights(self, weights: ArrayLike) -> NDArray[np.float32]:
+        """Return ``weights`` (H, W) in [0, 1], checked against the picture."""
+        checked = np.asarray(as_real_array(weights, "weights")[0], np.float32)
+        if checked.shape != self.array.shape[1:]:
+            msg = (
+                f"weights must have shape {self.array.shape[1:]} like image, "
+                f"got {checked.shape}"
+            )
+            raise ValueError(msg)
+        if not ((checked >= 0) & (checked <= 1)).all():
+            msg = (
+                "weights must be in [0, 1] and known everywhere, got values in "
+                f"[{checked.min()}, {checked.max()}]"
+            )
+            raise ValueError(msg)
+        return np.ascontiguousarray(checked)
 
     def restore(self, planes: NDArray[Any]) -> NDArray[Any]:
         """Return (C, H, W) as a picture of the type, range and axes that came."""

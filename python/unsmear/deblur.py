@@ -7,22 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from unsmear import _unsmear
-from unsmear._arrays import as_real_array
+from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
-from unsmear._progress import of_steps
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from unsmear._progress import Progress
 
-METHODS = ("wiener", "thesis")
+METHODS = ("tv", "fast", "wiener", "tikhonov", "richardson-lucy", "thesis")
 
 THESIS_REGULARIZATION = 0.02
 """r of the founding work."""
-
-COPIED_SHARE_WORTH_A_WARNING = 0.5
 
 
 @dataclass(frozen=True)
@@ -51,7 +47,9 @@ def deblur(
     flow: ArrayLike,
     *,
     exposure: float = 1.0,
-    method: str = "wiener",
+    method: str = "tv",
+    acceleration: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
     noise: float | None = None,
     regularization: float | None = None,
     degree: int = 4,
@@ -137,101 +135,37 @@ def deblur(
     if method not in METHODS:
         names = ", ".join(repr(name) for name in METHODS)
         raise ValueError(f"method must be one of {names}, got {method!r}")
+    if not (np.isfinite(exposure) and exposure > 0):
+        raise ValueError(f"exposure must be finite and positive, got {exposure}")
+    exposure = float(exposure)
     channels = Channels(image, channel_axis)
     if method == "thesis":
         r = THESIS_REGULARIZATION if regularization is None else float(regularization)
-        planes, report = _thesis(channels, flow, exposure, degree, r, progress)
-    else:
-        planes, report = _wiener(
+        planes, report = _deblur_methods.thesis(
+            channels, flow, exposure, degree, r, progress
+        )
+    elif method == "wiener":
+        planes, report = _deblur_methods.wiener(
             channels, flow, exposure, noise, regularization, progress
+        )
+    else:
+        planes, report = _deblur_methods.variational(
+            channels,
+            flow,
+            method,
+            exposure,
+            acceleration=acceleration,
+            weights=weights,
+            noise=noise,
+            regularization=regularization,
+            progress=progress,
         )
     report = {
         "method": method,
-        "exposure": float(exposure),
+        "exposure": exposure,
         **report,
         "pixels": int(np.prod(channels.array.shape[1:])),
         "version": _unsmear.__version__,
     }
-    report["warnings"] = _warnings(report)
+    report["warnings"] = _deblur_methods.warnings_of(report)
     return DeblurResult(channels.restore(planes), report)
-
-
-def _wiener(
-    channels: Channels,
-    flow: ArrayLike,
-    exposure: float,
-    noise: float | None,
-    regularization: float | None,
-    progress: Progress | None,
-) -> tuple[NDArray[Any], dict[str, Any]]:
-    single = channels.array.itemsize == 4
-    if regularization is not None:
-        regularization = float(regularization)
-    planes, report = (_unsmear.wiener_f32 if single else _unsmear.wiener_f64)(
-        channels.array,
-        channels.flow(flow),
-        float(exposure),
-        None if noise is None else float(noise) / channels.scale,
-        regularization,
-        of_steps(progress),
-    )
-    # From here on in the units of the picture that came.
-    automatic = regularization is None
-    report["noise"] = report["noise"] * channels.scale if automatic else None
-    report["regularization"] = None if automatic else regularization
-    return planes, report
-
-
-def _thesis(
-    channels: Channels,
-    flow: ArrayLike,
-    exposure: float,
-    degree: int,
-    regularization: float,
-    progress: Progress | None,
-) -> tuple[NDArray[Any], dict[str, Any]]:
-    if not (np.isfinite(exposure) and exposure > 0):
-        raise ValueError(f"exposure must be finite and positive, got {exposure}")
-    if degree not in (1, 2, 3, 4):
-        raise ValueError(f"degree must be 1, 2, 3 or 4, got {degree!r}")
-    channels.flow(flow)  # checks the shape; angles need all the precision that came
-    motion = exposure * np.asarray(as_real_array(flow, "flow")[0], np.float64)
-    planes, unknown = [], 0
-    for plane in channels.array.astype(np.float64):
-        restored, unknown = _unsmear.thesis_deblur(
-            plane,
-            np.ascontiguousarray(motion),
-            int(degree),
-            regularization,
-            of_steps(progress),
-        )
-        planes.append(restored)
-    report = {
-        "noise": None,
-        "regularization": regularization,
-        "degree": int(degree),
-        "unknown_pixels": unknown,
-    }
-    return np.stack(planes), report
-
-
-def _warnings(report: dict[str, Any]) -> list[str]:
-    """Say in words what a user should know before trusting the picture."""
-    warnings = []
-    if report["method"] == "thesis":
-        warnings.append(
-            "the founding method makes pictures worse and blackens their border; "
-            "it is kept for reference"
-        )
-    unknown = report["unknown_pixels"]
-    if unknown > COPIED_SHARE_WORTH_A_WARNING * report["pixels"]:
-        warnings.append(
-            f"{unknown} of {report['pixels']} pixels have unknown motion and were "
-            "copied"
-        )
-    if report.get("too_long_pixels", 0):
-        warnings.append(
-            f"{report['too_long_pixels']} pixels are blurred too long to be restored "
-            "and were copied"
-        )
-    return warnings

@@ -13,6 +13,7 @@ mod exposure;
 mod flow;
 mod interpolate;
 mod metrics;
+mod motion_deblur;
 mod parameters;
 mod psf;
 mod restoration;
@@ -43,6 +44,8 @@ mod _unsmear {
     use crate::interpolate::sample;
     #[pymodule_export]
     use crate::metrics::{error_map, psnr, ssim};
+    #[pymodule_export]
+    use crate::motion_deblur::{motion_deblur_f32, motion_deblur_f64};
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]

@@ -39,14 +39,23 @@
 //! | 16 | `exposure::search` | |
 //! | 17 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
-//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::scalar` | parts of the operator; one kernel for the whole picture |
-//! | 13 | [`motion_operator`] | blur along the path of every pixel |
-//! | 13 | `deblur::inverse_kernel`, `deblur::detail` | parts of the deblurring methods |
-//! | 14 | `deblur::wiener`, `deblur::thesis` | the deblurring methods |
-//! | 15 | [`deblur`] | their names |
-//! | 16 | `restoration::frame_motion`, `restoration::regions`, `restoration::walk` | parts of the restoration of clips |
-//! | 17 | [`restoration`] | their names |
-//! | 16 | [`metrics`] | how far an estimate is from the truth |
+//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::lanes` | parts of the operator; one kernel for the whole picture |
+//! | 13 | `motion_operator::plan` | |
+//! | 14 | `motion_operator::expand` | |
+//! | 15 | `motion_operator::sweep` | |
+//! | 16 | [`motion_operator`] | blur along the path of every pixel |
+//! | 13 | `deblur::inverse_kernel`, `deblur::detail`, `deblur::vectors`, `deblur::smoothness`, `deblur::half_size`, `deblur::grey_levels`, `deblur::occlusion`, `deblur::datum` | parts of the deblurring methods |
+//! | 14 | `deblur::wiener`, `deblur::thesis` | two of the methods |
+//! | 14 | `deblur::conjugate_gradient`, `deblur::structure`, `deblur::preparation` | |
+//! | 15 | `deblur::variational` | data and prior, reweighted |
+//! | 17 | `deblur::look` | |
+//! | 18 | `deblur::total_variation` | the default method |
+//! | 19 | `deblur::tikhonov`, `deblur::richardson_lucy` | |
+//! | 20 | `deblur::motion_deblur` | any of these three on one picture |
+//! | 21 | [`deblur`] | their names |
+//! | 22 | `restoration::frame_motion`, `restoration::regions`, `restoration::walk` | parts of the restoration of clips |
+//! | 23 | [`restoration`] | their names |
+//! | 22 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
 //! frequencies in cycles/px in parameters and rad/px inside.

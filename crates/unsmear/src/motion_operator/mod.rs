@@ -15,7 +15,8 @@
 //!
 //! z_k the major offset of line k from the pixel, z_0 < z_1 the path's ends, C the integral of kappa,
 //! S the speed; beyond its ends the path goes on straight. kappa is Keys' cubic (slope -1/2) or the triangle.
-//! The adjoint is the same sum as a scatter.
+//! The adjoint is the same sum as a scatter, in bands of rows: first every other band, then those between, so that
+//! none writes where another does, in an order that does not depend on the number of threads.
 //!
 //! Units: px. Validity: finite pictures; the major curvature is cut at 0.8 of the major motion, and
 //! paths of up to 1 px are taken as straight. A constant stays constant; a still pixel is
@@ -27,12 +28,24 @@
 //! "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29 (1981) 1153-1160,
 //! [10.1109/TASSP.1981.1163711](https://doi.org/10.1109/TASSP.1981.1163711).
 
-mod scalar;
+mod expand;
+mod lanes;
+mod plan;
+mod sweep;
+
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
-use scalar::{ScalarPath, for_each_tap};
+use lanes::LANES;
+use plan::RowPlan;
+use sweep::{Scratch, gather_row, scatter_row};
+
+/// Rows gathered per task.
+const ROWS_PER_TASK: usize = 8;
+/// Rows of data scattered per task, at least: some 2 ms of work on a wide picture.
+const LEAST_BAND: usize = 64;
 
 /// How x is interpolated between its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,12 +56,27 @@ pub enum Taps {
     Linear,
 }
 
+impl Taps {
+    /// Where the kernel ends, px.
+    fn reach(self) -> usize {
+        match self {
+            Self::Cubic => 2,
+            Self::Linear => 1,
+        }
+    }
+}
+
 /// The blur of [`MotionPaths`]; see the [module](self).
+///
+/// Holds 12 (straight paths) to 30 bytes per pixel.
 #[derive(Debug, Clone)]
 pub struct MotionOperator {
-    paths: MotionPaths,
+    plans: Vec<RowPlan>,
+    width: usize,
     taps: Taps,
     pad: usize,
+    /// Padding for which nothing is clamped.
+    reach: usize,
 }
 
 impl MotionOperator {
@@ -57,48 +85,82 @@ impl MotionOperator {
     /// # Errors
     /// [`Error::Shape`] for an empty picture or planes whose shapes differ.
     pub fn new(paths: &MotionPaths, taps: Taps, pad: usize) -> Result<Self> {
+        let (height, width) = paths.dim();
         if paths.velocity.u.is_empty() {
             return Err(Error::shape("paths", "(H >= 1, W >= 1)", paths.velocity.u.shape()));
         }
-        Ok(Self { paths: paths.clone(), taps, pad })
+        for field in [&paths.curvature].into_iter().chain(&paths.offset) {
+            if field.u.dim() != (height, width) || field.v.dim() != (height, width) {
+                let expected = format!("({height}, {width}) in all planes");
+                return Err(Error::shape("paths", expected, field.u.shape()));
+            }
+        }
+        let row = |y| RowPlan::new(paths, y, taps);
+        let plans: Vec<RowPlan> = (0..height).into_par_iter().map(row).collect();
+        // A block wider than the picture writes zeros beyond it.
+        let beyond = LANES.saturating_sub(width);
+        let reach = plans.iter().map(|plan| plan.reach).max().unwrap_or(0) + beyond;
+        Ok(Self { plans, width, taps, pad, reach })
     }
 
-    /// Calls `tap(index of x, weight)` for every sample that data pixel (y, x) reads.
-    fn for_each_tap(&self, y: usize, x: usize, mut tap: impl FnMut(usize, f64)) {
-        let (rows, columns) = self.unknown_shape();
-        let place = |row: i64, column: i64| {
-            let row = (y as i64 + self.pad as i64 + row).clamp(0, rows as i64 - 1);
-            let column = (x as i64 + self.pad as i64 + column).clamp(0, columns as i64 - 1);
-            row as usize * columns + column as usize
-        };
-        let at = |field: &crate::FlowField<f32>| field.view().at(y, x).map(f64::from);
-        let velocity = at(&self.paths.velocity);
-        if velocity.iter().any(|z| z.is_nan()) {
-            return tap(place(0, 0), 1.0);
-        }
-        let (curvature, offset) =
-            (at(&self.paths.curvature), self.paths.offset.as_ref().map_or([0.0; 2], at));
-        let down = velocity[1].abs() > velocity[0].abs();
-        let order = |[u, v]: [f64; 2]| if down { [v, u] } else { [u, v] };
-        let path = ScalarPath {
-            velocity: order(velocity),
-            curvature: order(curvature),
-            offset: order(offset),
-        };
-        for_each_tap(&path, self.taps, |major, minor, weight| {
-            tap(if down { place(major, minor) } else { place(minor, major) }, weight);
+    /// A x for a padding that clamps nothing.
+    fn gather(&self, x: &[f32], pad: usize, b: &mut [f32]) {
+        let stride = self.width + 2 * pad;
+        b.par_chunks_mut(self.width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
+            let mut scratch = Scratch::default();
+            for (i, out) in rows.chunks_mut(self.width).enumerate() {
+                let y = task * ROWS_PER_TASK + i;
+                let (plan, start) = (&self.plans[y], (y + pad) * stride + pad);
+                match self.taps {
+                    Taps::Cubic => gather_row::<true>(plan, x, stride, start, out, &mut scratch),
+                    Taps::Linear => gather_row::<false>(plan, x, stride, start, out, &mut scratch),
+                }
+            }
         });
+    }
+
+    /// A^T r for a padding that clamps nothing.
+    fn scatter(&self, r: &[f32], pad: usize, x: &mut [f32]) {
+        let stride = self.width + 2 * pad;
+        let band = LEAST_BAND.max(2 * self.reach);
+        x.par_chunks_mut(stride * ROWS_PER_TASK).for_each(|rows| rows.fill(0.0));
+        for phase in 0..2 {
+            // Band number i writes from `reach` rows above its first to as many below its last.
+            let above = ((pad - self.reach + phase * band) * stride).min(x.len());
+            let places = x[above..].par_chunks_mut(2 * band * stride).enumerate();
+            places.for_each(|(i, place)| {
+                let mut scratch = Scratch::default();
+                let first = (2 * i + phase) * band;
+                for y in first..(first + band).min(self.plans.len()) {
+                    let (plan, start) = (&self.plans[y], (y - first + self.reach) * stride + pad);
+                    let row = &r[y * self.width..][..self.width];
+                    match self.taps {
+                        Taps::Cubic => {
+                            scatter_row::<true>(plan, row, stride, start, place, &mut scratch);
+                        }
+                        Taps::Linear => {
+                            scatter_row::<false>(plan, row, stride, start, place, &mut scratch);
+                        }
+                    }
+                }
+            });
+        }
+    }
+
+    /// Where a row of the picture padded by `self.reach` continues in that padded by `self.pad` (both as rows or both as
+    /// columns, of `count` in the latter).
+    fn clamped(&self, i: usize, count: usize) -> usize {
+        (i + self.pad).saturating_sub(self.reach).min(count - 1)
     }
 }
 
 impl LinearOperator for MotionOperator {
     fn unknown_shape(&self) -> (usize, usize) {
-        let (height, width) = self.paths.dim();
-        (height + 2 * self.pad, width + 2 * self.pad)
+        (self.plans.len() + 2 * self.pad, self.width + 2 * self.pad)
     }
 
     fn data_shape(&self) -> (usize, usize) {
-        self.paths.dim()
+        (self.plans.len(), self.width)
     }
 
     fn pad(&self) -> usize {
@@ -106,23 +168,36 @@ impl LinearOperator for MotionOperator {
     }
 
     fn apply(&self, x: &[f32], b: &mut [f32]) {
-        let (height, width) = self.data_shape();
-        for row in 0..height {
-            for column in 0..width {
-                let mut sum = 0.0;
-                self.for_each_tap(row, column, |i, weight| sum += weight * f64::from(x[i]));
-                b[row * width + column] = sum as f32;
-            }
+        let (rows, columns) = self.unknown_shape();
+        assert_eq!(x.len(), rows * columns, "x has the shape of the unknown");
+        assert_eq!(b.len(), self.plans.len() * self.width, "b has the shape of the data");
+        if self.reach <= self.pad {
+            return self.gather(x, self.pad, b);
         }
+        let (height, width) = (self.plans.len() + 2 * self.reach, self.width + 2 * self.reach);
+        let mut wide = Vec::with_capacity(height * width);
+        for y in 0..height {
+            let row = &x[self.clamped(y, rows) * columns..][..columns];
+            wide.extend((0..width).map(|x| row[self.clamped(x, columns)]));
+        }
+        self.gather(&wide, self.reach, b);
     }
 
     fn adjoint(&self, r: &[f32], x: &mut [f32]) {
-        let (height, width) = self.data_shape();
+        let (rows, columns) = self.unknown_shape();
+        assert_eq!(x.len(), rows * columns, "x has the shape of the unknown");
+        assert_eq!(r.len(), self.plans.len() * self.width, "r has the shape of the data");
+        if self.reach <= self.pad {
+            return self.scatter(r, self.pad, x);
+        }
+        let (height, width) = (self.plans.len() + 2 * self.reach, self.width + 2 * self.reach);
+        let mut wide = vec![0.0; height * width];
+        self.scatter(r, self.reach, &mut wide);
         x.fill(0.0);
-        for row in 0..height {
-            for column in 0..width {
-                let datum = f64::from(r[row * width + column]);
-                self.for_each_tap(row, column, |i, weight| x[i] += (weight * datum) as f32);
+        for (y, from) in wide.chunks(width).enumerate() {
+            let row = &mut x[self.clamped(y, rows) * columns..][..columns];
+            for (x, sample) in from.iter().enumerate() {
+                row[self.clamped(x, columns)] += sample;
             }
         }
     }

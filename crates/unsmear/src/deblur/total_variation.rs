@@ -1,0 +1,165 @@
+//! The default restoration: total variation from half size to full size, as strong as noise and residual ask for.
+//!
+//! 1. At half size, where blur is half as long, some turns from the blurred data; the result, doubled, is the start.
+//! 2. At full size the first turns, lambda from the noise alone:
+//!
+//! ```text
+//! lambda = 0.065 s^1.5,      s^2 = sigma^2 + 0.15^2
+//! ```
+//!
+//! 3. What the model cannot explain is treated as further noise, and single samples that it cannot explain at all weigh
+//!    little (Cauchy, c = 3 max(sigma, 0.7)):
+//!
+//! ```text
+//! s^2 <- s^2 + 20 max(0, rms(A x - b)^2 - sigma^2),      mismatch = rms(A x - b) / sigma
+//! ```
+//!
+//! A right model overfits a little: mismatch is .6 to .95 and nothing changes; above [`MISMATCH`] the motion is wrong
+//! somewhere. Units: grey levels of a picture of ordinary contrast (`grey_levels.rs`).
+
+use super::half_size::{Doubling, halve};
+use super::look::{Look, data, operators};
+use super::structure::Prior;
+use super::variational::{Solution, Variational};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::linear_operator::LinearOperator;
+use crate::motion_operator::{MotionOperator, Taps};
+
+/// Ratio of residual to noise above which the model is said not to fit.
+pub const MISMATCH: f64 = 1.03;
+
+/// lambda of unit noise, and the exponent of the noise: the best of grids over photographs at noise .3 to 5.
+const STRENGTH: (f64, f64) = (0.065, 1.5);
+
+/// What the operator itself errs by, grey levels.
+const MODEL_NOISE: f64 = 0.15;
+
+/// Share of the unexplained residual's variance that counts as noise: residuals show only the part of an error that no
+/// picture could explain.
+const UNEXPLAINED: f64 = 20.0;
+
+/// Cauchy's scale in deviations of the noise, and the least noise it supposes, grey levels.
+const ROBUST: (f64, f64) = (3.0, 0.7);
+
+/// The prior: rounding at half a grey level per px.
+const PRIOR: Prior = Prior { rounding: 0.5, structure: false };
+
+/// Turns and steps of a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// At half size.
+    pub half: (usize, usize),
+    /// At full size with the strength of the noise.
+    pub first: (usize, usize),
+    /// At full size with the strength of the residual, robustly; 0 turns: not at all.
+    pub second: (usize, usize),
+}
+
+impl Effort {
+    /// Within 0.1 dB of convergence.
+    pub const QUALITY: Self = Self { half: (5, 12), first: (2, 15), second: (2, 15) };
+    /// About 1 dB below, in less than half the time.
+    pub const FAST: Self = Self { half: (5, 12), first: (1, 10), second: (1, 10) };
+
+    /// Conjugate-gradient steps for all channels.
+    #[must_use]
+    pub fn steps(&self, channels: usize) -> usize {
+        [self.half, self.first, self.second].iter().map(|(turns, steps)| turns * steps * channels).sum()
+    }
+}
+
+/// A restoration by total variation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TotalVariation {
+    /// Standard deviation of the noise, grey levels, >= 0.
+    pub noise: f64,
+    /// lambda, grey levels; None: by the rules of the [module](self).
+    pub lambda: Option<f64>,
+    /// How long to work.
+    pub effort: Effort,
+}
+
+/// A restored picture and what was found on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Restored {
+    /// The solution on the padded grid.
+    pub solution: Solution,
+    /// Pixels of padding on each side.
+    pub pad: usize,
+    /// lambda at the end, grey levels.
+    pub lambda: f64,
+    /// Residual over noise before the motion's errors were allowed for.
+    pub mismatch: f64,
+}
+
+impl TotalVariation {
+    /// Restores the one picture that all `looks` show.
+    ///
+    /// # Errors
+    /// [`Error::Value`] without looks or for parameters out of range; [`Error::Shape`] for shapes that differ;
+    /// [`Error::Cancelled`].
+    pub fn restore(&self, looks: &[Look<'_>], control: &Control) -> Result<Restored> {
+        let Some(channels) = looks.first().map(|look| look.planes.len()) else {
+            return Err(Error::value("looks", "at least one", 0));
+        };
+        control.expect(self.effort.steps(channels));
+        let floor = self.noise.powi(2) + MODEL_NOISE.powi(2);
+        let first = self.stage(self.lambda.unwrap_or(strength(floor)), self.effort.first, false);
+        let (operators, pad) = operators(looks, Taps::Cubic)?;
+        let start = self.half_size(looks, &operators[0], first.lambda, control)?;
+        let data = data(looks, &operators)?;
+        let mut solution = first.solve(&data, Some(start), control)?;
+        let mismatch = solution.residual / self.noise;
+        let unexplained = (solution.residual.powi(2) - self.noise.powi(2)).max(0.0);
+        let allowed = if unexplained.is_nan() { floor } else { floor + UNEXPLAINED * unexplained };
+        let lambda = self.lambda.unwrap_or(strength(allowed));
+        if self.effort.second.0 > 0 {
+            let second = self.stage(lambda, self.effort.second, true);
+            let steps = solution.steps;
+            solution = second.solve(&data, Some(solution.channels), control)?;
+            solution.steps += steps;
+        }
+        Ok(Restored { solution, pad, lambda, mismatch })
+    }
+
+    fn stage(&self, lambda: f64, (turns, steps): (usize, usize), robust: bool) -> Variational {
+        let scale = robust.then_some(ROBUST.0 * self.noise.max(ROBUST.1));
+        Variational { lambda, prior: Some(PRIOR), robust: scale, turns, steps }
+    }
+
+    /// The start at full size: restored at half size, doubled.
+    fn half_size(
+        &self,
+        looks: &[Look<'_>],
+        full: &MotionOperator,
+        lambda: f64,
+        control: &Control,
+    ) -> Result<Vec<Vec<f32>>> {
+        let halves: Vec<_> =
+            looks.iter().map(|look| halve(&look.planes, &look.weights.view())).collect();
+        let small: Vec<Look<'_>> = looks
+            .iter()
+            .zip(&halves)
+            .map(|(look, (planes, weights))| Look {
+                paths: look.paths.halved(),
+                planes: planes.iter().map(|plane| plane.view()).collect(),
+                weights: weights.clone(),
+            })
+            .collect();
+        let (operators, pad) = operators(&small, Taps::Cubic)?;
+        let data = data(&small, &operators)?;
+        let solution = self.stage(lambda, self.effort.half, false).solve(&data, None, control)?;
+        let doubling = Doubling {
+            from: operators[0].unknown_shape(),
+            from_pad: pad,
+            to: full.unknown_shape(),
+            to_pad: full.pad(),
+        };
+        solution.channels.iter().map(|plane| doubling.apply(plane, control)).collect()
+    }
+}
+
+fn strength(noise_power: f64) -> f64 {
+    STRENGTH.0 * noise_power.powf(0.5 * STRENGTH.1)
+}

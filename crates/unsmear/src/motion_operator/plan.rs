@@ -1,0 +1,254 @@
+//! The paths of a row of pixels, sorted into blocks of [`LANES`] neighbours that share an axis.
+//!
+//! Pixels of a block take the grid lines of their major axis together: line o of each lies o pixels from it,
+//! so that what they read stands side by side in memory. A block in which both axes occur makes a
+//! record for either, in which the pixels of the other weigh nothing (and follow the path of one that does).
+//!
+//! Each record knows its lines in advance, hence how far apart its pixels are on each of them, and
+//! the factor that makes the weights of a pixel sum to 1. Paths that bend by less than [`STRAIGHT`] are
+//! straight, and where all of a block are, and go through their pixels, line -o mirrors line o.
+
+use multiversion::multiversion;
+
+use super::Taps;
+use super::lanes::{LANES, Lanes, Parabola, curved_line, straight_line};
+use crate::motion_path::MotionPaths;
+
+/// Largest curvature q, px, of a path that is taken as straight: it leaves the line by an eighth of it.
+const STRAIGHT: f32 = 0.1;
+/// Shortest major motion, px: below, a pixel is still or, if it has an offset, moves so far.
+const LEAST_MOTION: f32 = 0.02;
+/// Longest major motion, px, that is always straight.
+const SHORT: f32 = 1.0;
+/// Largest major curvature as a share of the major motion: at 2 the path would turn back.
+const MOST_BEND: f32 = 0.8;
+
+/// How the pixels of a record move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Not at all. Lanes: whether the pixel is meant, 1 or 0.
+    Still,
+    /// Straight through themselves. Lanes: gain, b / a, a / 2.
+    Straight,
+    /// On parabolas. Lanes: gain, a, b, q_a, q_b.
+    Curved,
+    /// On parabolas with an offset. Lanes: gain, a, b, q_a, q_b, d_a, d_b.
+    Offset,
+}
+
+/// One block of one row on one axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Record {
+    /// First column.
+    pub(super) column: u32,
+    pub(super) kind: Kind,
+    /// Whether the major axis is the vertical one.
+    pub(super) down: bool,
+    /// First line and number of lines; a straight record has those from 0 on and is also meant mirrored.
+    pub(super) first: i16,
+    pub(super) count: u16,
+    /// Lines from the first to the second, exclusive, lie between the ends of all paths.
+    pub(super) inner: [i16; 2],
+    /// Where its lines and lanes begin in the row's.
+    pub(super) lines: u32,
+    pub(super) lanes: u32,
+    /// Rows of weights it makes.
+    pub(super) rows: u32,
+}
+
+/// Minor positions of a block on one line: the floor of the least, and how much greater that of the greatest is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    pub(super) floor: i16,
+    pub(super) span: u16,
+}
+
+/// All records of a row of pixels.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RowPlan {
+    pub(super) records: Vec<Record>,
+    pub(super) lines: Vec<Line>,
+    pub(super) lanes: Vec<Lanes>,
+    /// Rows or columns from a pixel to what it reads, at most.
+    pub(super) reach: usize,
+}
+
+/// The pixels of a block that belong to a record.
+type Block = [Option<Parabola>; LANES];
+
+impl RowPlan {
+    /// The plan of row `y`.
+    pub(super) fn new(paths: &MotionPaths, y: usize, taps: Taps) -> Self {
+        let width = paths.dim().1;
+        let mut plan = Self::default();
+        for first in (0..width).step_by(LANES) {
+            // The last block is moved back onto the picture; what the one before does is left out.
+            let column = first.min(width.saturating_sub(LANES));
+            let mut still = Lanes::ZERO;
+            let mut moving: [Block; 2] = [[None; LANES]; 2];
+            for x in first..(column + LANES).min(width) {
+                match path_of(paths, y, x) {
+                    None => still.0[x - column] = 1.0,
+                    Some((path, down)) => moving[usize::from(down)][x - column] = Some(path),
+                }
+            }
+            if still != Lanes::ZERO {
+                let record = plan.record(column, Kind::Still, false);
+                plan.records.push(Record { rows: 1, ..record });
+                plan.lanes.push(still);
+            }
+            for (block, down) in moving.iter().zip([false, true]) {
+                plan.push_block(column, block, down, taps);
+            }
+        }
+        plan.records.shrink_to_fit();
+        plan.lines.shrink_to_fit();
+        plan.lanes.shrink_to_fit();
+        plan
+    }
+
+    /// A record without lines.
+    fn record(&self, column: usize, kind: Kind, down: bool) -> Record {
+        Record {
+            column: column as u32,
+            kind,
+            down,
+            first: 0,
+            count: 0,
+            inner: [0; 2],
+            lines: self.lines.len() as u32,
+            lanes: self.lanes.len() as u32,
+            rows: 0,
+        }
+    }
+
+    /// Adds the record of the pixels of `block`, if any.
+    fn push_block(&mut self, column: usize, block: &Block, down: bool, taps: Taps) {
+        let Some(any) = block.iter().flatten().next().copied() else { return };
+        let paths = block.map(|path| path.unwrap_or(any));
+        let kind = if paths.iter().any(|p| p.offset != [0.0; 2]) {
+            Kind::Offset
+        } else if paths.iter().any(|p| p.curvature != [0.0; 2]) {
+            Kind::Curved
+        } else {
+            Kind::Straight
+        };
+        let mut record = self.record(column, kind, down);
+        set_lines(&mut record, &paths, taps.reach());
+        let plane = |value: fn(&Parabola) -> f32| Lanes(paths.each_ref().map(value));
+        self.lanes.push(Lanes(block.map(|path| f32::from(u8::from(path.is_some())))));
+        if kind == Kind::Straight {
+            let slope = plane(|p| p.velocity[1] / p.velocity[0]);
+            self.lanes.extend([slope, plane(|p| 0.5 * p.velocity[0])]);
+        } else {
+            self.lanes.extend([plane(|p| p.velocity[0]), plane(|p| p.velocity[1])]);
+            self.lanes.extend([plane(|p| p.curvature[0]), plane(|p| p.curvature[1])]);
+        }
+        if kind == Kind::Offset {
+            self.lanes.extend([plane(|p| p.offset[0]), plane(|p| p.offset[1])]);
+        }
+        let (before, lanes) = (self.lines.len(), &self.lanes[record.lanes as usize..]);
+        let sums = match taps {
+            Taps::Cubic => survey::<true>(&record, lanes, &mut self.lines),
+            Taps::Linear => survey::<false>(&record, lanes, &mut self.lines),
+        };
+        for (gain, sum) in self.lanes[record.lanes as usize].0.iter_mut().zip(sums.0) {
+            *gain = if *gain > 0.0 { 1.0 / sum } else { 0.0 };
+        }
+        let rows = |line: &Line| u32::from(line.span) + 2 * taps.reach() as u32;
+        record.rows = self.lines[before..].iter().map(rows).sum();
+        let ends = [record.first, record.first + record.count as i16 - 1];
+        let across = self.lines[before..].iter().flat_map(|line| {
+            let last = i32::from(line.floor) + i32::from(line.span) + 2;
+            [last, i32::from(line.floor) - 1]
+        });
+        let farthest = across.chain(ends.map(i32::from)).map(i32::unsigned_abs).max();
+        self.reach = self.reach.max(farthest.map_or(0, |z| z as usize));
+        self.records.push(record);
+    }
+}
+
+/// The path of pixel (row y, column x), and whether its major axis is the vertical one; None: still, or unknown.
+fn path_of(paths: &MotionPaths, y: usize, x: usize) -> Option<(Parabola, bool)> {
+    let [u, v] = paths.velocity.view().at(y, x);
+    let bend = paths.curvature.view().at(y, x);
+    let shift = paths.offset.as_ref().map_or([0.0; 2], |offset| offset.view().at(y, x));
+    let down = v.abs() > u.abs();
+    let order = |[x, y]: [f32; 2]| if down { [y, x] } else { [x, y] };
+    let [a, b] = order([u, v]);
+    if (a + b).is_nan() || (a.abs() < LEAST_MOTION && shift == [0.0; 2]) {
+        return None;
+    }
+    // Back in time along -V is forth in time along V.
+    let velocity =
+        if a.abs() < LEAST_MOTION { [LEAST_MOTION, 0.0] } else { [a.abs(), b * a.signum()] };
+    let mut curvature = [0.0; 2];
+    if a.abs() > SHORT && bend.iter().any(|q| q.abs() > STRAIGHT) {
+        let [qa, qb] = order(bend);
+        let share = (MOST_BEND * a.abs() / qa.abs()).min(1.0);
+        curvature = [share * qa, share * qb];
+    }
+    Some((Parabola { velocity, curvature, offset: order(shift) }, down))
+}
+
+/// Sets the lines that weigh anything, and those inside of all paths.
+fn set_lines(record: &mut Record, paths: &[Parabola; LANES], reach: usize) {
+    let end = |i: usize| paths.iter().map(move |p| p.offset[0] + p.ends()[i]);
+    let least = |i: usize| end(i).fold(f32::INFINITY, f32::min);
+    let most = |i: usize| end(i).fold(f32::NEG_INFINITY, f32::max);
+    let reach = reach as f32;
+    let first = (least(0) - reach).floor() as i16 + 1;
+    let last = (most(1) + reach).ceil() as i16 - 1;
+    record.inner = [(most(0) + reach).ceil() as i16, (least(1) - reach).floor() as i16 + 1];
+    record.first = if record.kind == Kind::Straight { 0 } else { first };
+    record.count = (last - record.first + 1) as u16;
+}
+
+/// Adds the lines of a record to `lines`; gives the sums of its weights.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<Line>) -> Lanes {
+    let mut sums = Lanes::ZERO;
+    let (mut weight, mut minor) = (Lanes::ZERO, Lanes::ZERO);
+    for i in 0..record.count {
+        line_of::<CUBIC>(record, lanes, i as i16, &mut weight, &mut minor);
+        let twice = if record.kind == Kind::Straight { 2.0 } else { 1.0 };
+        let (mut least, mut most) = (minor.0[0], minor.0[0]);
+        for lane in 0..LANES {
+            sums.0[lane] += twice * weight.0[lane];
+            least = if minor.0[lane] < least { minor.0[lane] } else { least };
+            most = if minor.0[lane] > most { minor.0[lane] } else { most };
+        }
+        let floor = least.floor();
+        lines.push(Line { floor: floor as i16, span: (most.floor() - floor) as u16 });
+    }
+    sums
+}
+
+/// Weights, times the gain, and minor positions of the pixels on the line number `i` of a record.
+#[inline(always)]
+pub(super) fn line_of<const CUBIC: bool>(
+    record: &Record,
+    lanes: &[Lanes],
+    i: i16,
+    weight: &mut Lanes,
+    minor: &mut Lanes,
+) {
+    let line = record.first + i;
+    let inner = record.inner[0] <= line && line < record.inner[1];
+    match (record.kind, inner) {
+        (Kind::Still, _) => (*weight, *minor) = (lanes[0], Lanes::ZERO),
+        (Kind::Straight, _) => straight_line::<CUBIC>(lanes, f32::from(line), inner, weight, minor),
+        (Kind::Curved, true) => {
+            curved_line::<CUBIC, true, false>(lanes, f32::from(line), weight, minor);
+        }
+        (Kind::Curved, false) => {
+            curved_line::<CUBIC, false, false>(lanes, f32::from(line), weight, minor);
+        }
+        (Kind::Offset, true) => {
+            curved_line::<CUBIC, true, true>(lanes, f32::from(line), weight, minor);
+        }
+        (Kind::Offset, false) => {
+            curved_line::<CUBIC, false, true>(lanes, f32::from(line), weight, minor);
+        }
+    }
+}
