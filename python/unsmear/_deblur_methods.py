@@ -48,7 +48,9 @@ def variational(
         method,
         exposure,
         acceleration=(
-            None if acceleration is None else channels.flow(acceleration, "acceleration")
+            None
+            if acceleration is None
+            else channels.flow(acceleration, "acceleration")
         ),
         weights=None if weights is None else channels.weights(weights),
         noise=None if noise is None else float(noise) / channels.scale,

@@ -259,26 +259,18 @@ def estimate_exposure(
 
 # Parts of the restoration of clips.
 
-class _Look(TypedDict):
-    planes: _Single
-    weights: _Single
-    velocity: _Single
-    acceleration: _Single
-    offset: _Single | None
-    exposure: float
-
-def looks_reach(looks: Sequence[_Look]) -> int: ...
+def looks_reach(looks: Sequence[Mapping[str, Any]]) -> int: ...
 def restore_looks(
-    looks: Sequence[_Look],
+    looks: Sequence[Mapping[str, Any]],
     pad: int,
     lambdas: Sequence[float],
     robust: float,
     first: tuple[int, int],
-    next: tuple[int, int],
+    following: tuple[int, int],
     start: _Single | None = None,
     progress: _Progress | None = None,
 ) -> tuple[list[_Single], list[float]]: ...
-def record_look(look: _Look, x: _Single, pad: int) -> _Single: ...
+def record_look(look: Mapping[str, Any], x: _Single, pad: int) -> _Single: ...
 def frame_motion(
     forward: _Single | None = None,
     backward: _Single | None = None,

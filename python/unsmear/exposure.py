@@ -172,7 +172,7 @@ def estimate_exposure(
         (float(limits[0]), float(limits[1])),
         None if noise is None else float(noise) / scale,
         seed % 2**64,
-        of_steps(progress),
+        progress=of_steps(progress),
     )
     found["noise"] *= scale
     return ExposureEstimate(**found)

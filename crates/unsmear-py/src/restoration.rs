@@ -63,7 +63,7 @@ pub(crate) fn looks_reach(looks: Vec<Look<'_>>) -> PyResult<usize> {
 
 /// The picture that all `looks` show, for each of `lambdas`, padded by `pad`; and the residuals.
 #[pyfunction]
-#[pyo3(signature = (looks, pad, lambdas, robust, first, next, start=None, progress=None))]
+#[pyo3(signature = (looks, pad, lambdas, robust, first, following, start=None, progress=None))]
 pub(crate) fn restore_looks<'py>(
     py: Python<'py>,
     looks: Vec<Look<'py>>,
@@ -71,11 +71,11 @@ pub(crate) fn restore_looks<'py>(
     lambdas: Vec<f64>,
     robust: f64,
     first: (usize, usize),
-    next: (usize, usize),
+    following: (usize, usize),
     start: Option<PyReadonlyArray3<'py, f32>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Vec<Planes<'py>>, Vec<f64>)> {
-    let walk = Walk { lambdas, robust, first, next };
+    let walk = Walk { lambdas, robust, first, next: following };
     let paths = looks.iter().map(Look::paths).collect::<Result<Vec<_>>>();
     let paths = paths.map_err(|e| to_python(&e))?;
     let recorded: Vec<(ArrayView3<'_, f32>, ArrayView2<'_, f32>)> =

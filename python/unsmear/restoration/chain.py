@@ -18,7 +18,7 @@ from unsmear import _unsmear
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.joint import Neighbour, restore_jointly
-from unsmear.restoration.looks import TWIN, WALK, cropped, look, walk
+from unsmear.restoration.looks import TWIN, WALK, Look, cropped, look, walk
 from unsmear.restoration.memo import Memo
 from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
 from unsmear.restoration.verdict import Verdict, judge
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Chain", "Restored", "Settings"]
 
 KEPT_BEHIND = 5
-"""Frames that a frame may look back on, through exposures and twins of its neighbours."""
+"""Frames that one looks back on, through exposures and twins of its neighbours."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Chain:
         ]
         return medians[0] / max(medians[1], 1e-6)
 
-    def _look(self, index: int, planes: Planes) -> dict[str, Any]:
+    def _look(self, index: int, planes: Planes) -> Look:
         motion = self.motion.motion(index)
         exposure = self._exposure.exposure(index).value
         visible = _unsmear.visibility(motion.velocity, exposure)
@@ -161,9 +161,11 @@ class Chain:
 
     def _own_strength(self, index: int) -> float:
         noise = self._exposure.exposure(index).noise
-        return self._memo.get(
-            "strength", index, lambda: choose_strength(WALK, self._scores(index), noise)
-        )
+
+        def choose() -> float:
+            return choose_strength(WALK, self._scores(index), noise)
+
+        return self._memo.get("strength", index, choose)
 
     def _strength(self, index: int) -> float:
         """Return the strength for a frame: those of it and its neighbours, 2 to 1."""
@@ -251,7 +253,9 @@ class Chain:
 
     def _way(self, start: int, end: int) -> Planes | None:
         """Return the flow between two frames next to each other."""
-        return self.motion.flow(start, end) if abs(start - end) == 1 else None
+        if abs(start - end) != 1:
+            return None
+        return self.motion.flow(start, end)
 
     @staticmethod
     def _composed(

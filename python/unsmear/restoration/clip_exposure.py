@@ -97,9 +97,7 @@ class ClipExposure:
         )
 
     def _around(self, index: int, reach: int) -> range:
-        return range(
-            max(0, index - reach), min(self._source.count, index + reach + 1)
-        )
+        return range(max(0, index - reach), min(self._source.count, index + reach + 1))
 
     def _smoothed(self, index: int) -> Exposure:
         own = self._found(index)

@@ -18,13 +18,13 @@ it is left out, whatever the reason.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unsmear import _unsmear
 from unsmear.flow import optical_flow
-from unsmear.restoration.looks import look, walk
+from unsmear.restoration.looks import Look, look, walk
 from unsmear.restoration.sampling import (
     carried,
     composed,
@@ -47,10 +47,10 @@ __all__ = ["Neighbour", "restore_jointly"]
 GREATEST_ERROR = 20.0
 SMOOTHING = 6.0
 STRENGTH = 0.6
-"""lambda of the joint restoration relative to that of one frame: more data, less noise."""
+"""lambda of the joint restoration relative to that of one frame: less noise."""
 EFFORT = (4, 12)
-REGISTRATION = {"smoothness": 0.2}
-"""Flow of `unsmear.optical_flow` for the small rest of a registration."""
+SMOOTHNESS = 0.2
+"""Of the flow that refines a registration: what is left of it varies slowly."""
 
 
 class Neighbour:
@@ -89,7 +89,7 @@ class Neighbour:
         hidden |= visible == 0
         self.seen = (~_unsmear.dilated(hidden, 1)).astype(np.float32)
 
-    def look(self, weights: NDArray[np.float32]) -> dict[str, Any]:
+    def look(self, weights: NDArray[np.float32]) -> Look:
         """Return the solver's look at it."""
         velocity = carried(self.offset, self.motion.velocity)
         return look(
@@ -106,12 +106,12 @@ class Neighbour:
         predicted = _unsmear.record_look(self.look(self.seen), picture, pad)
         pair = np.stack([Source.luma_of(self.planes), Source.luma_of(predicted)])
         rest = optical_flow(
-            np.nan_to_num(pair), index=0, method=method, **REGISTRATION
+            np.nan_to_num(pair), index=0, method=method, smoothness=SMOOTHNESS
         ).flow
         moved = rest + pulled_field(self.offset, rest)
         self.offset = np.where(np.isfinite(moved), moved, self.offset)
 
-    def trusted(self, picture: Planes, pad: int, noise: float) -> dict[str, Any]:
+    def trusted(self, picture: Planes, pad: int, noise: float) -> Look:
         """Return the look, weighted by how well the restoration predicts it."""
         every = self.look(self.seen)
         predicted = _unsmear.record_look(every, picture, pad)
@@ -126,7 +126,7 @@ class Neighbour:
 
 
 def restore_jointly(
-    own: dict[str, Any],
+    own: Look,
     neighbours: list[Neighbour],
     picture: Planes,
     pad: int,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from unsmear import _unsmear
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["cropped", "look", "robust_scale", "walk"]
+__all__ = ["Look", "cropped", "look", "robust_scale", "walk"]
 
 WALK = (0.015, 0.045, 0.13, 0.4)
 """Strengths of the prior that are compared, grey levels."""
@@ -26,6 +26,17 @@ NEXT = (3, 12)
 """Turns and steps of one that starts from another of nearly the same strength."""
 
 
+class Look(TypedDict):
+    """A recorded picture (C, H, W) in grey levels and the paths of its light."""
+
+    planes: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    velocity: NDArray[np.float32]
+    acceleration: NDArray[np.float32]
+    offset: NDArray[np.float32] | None
+    exposure: float
+
+
 def look(
     planes: NDArray[np.float32],
     velocity: NDArray[np.float32],
@@ -33,7 +44,7 @@ def look(
     exposure: float,
     weights: NDArray[np.float32],
     offset: NDArray[np.float32] | None = None,
-) -> dict[str, Any]:
+) -> Look:
     """Return one look; unknown motion and offset are not believed."""
     known = np.isfinite(velocity).all(axis=-1)
     if offset is not None:
@@ -55,7 +66,7 @@ def robust_scale(noise: float) -> float:
 
 
 def walk(
-    looks: list[dict[str, Any]],
+    looks: list[Look],
     lambdas: tuple[float, ...],
     noise: float,
     *,

@@ -12,9 +12,7 @@ from unsmear import _unsmear
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["carried", "composed", "inside", "pulled", "smoothed", "pulled_field"]
-
-Picture = "NDArray[np.float32]"
+__all__ = ["carried", "composed", "inside", "pulled", "pulled_field", "smoothed"]
 
 
 def _positions(
@@ -84,7 +82,8 @@ def carried(
 def smoothed(plane: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
     """Return a plane (H, W) smoothed by a Gaussian of ``sigma`` px."""
     radius = math.ceil(3 * sigma)
-    taps = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    along = list(taps / taps.sum())
+    bell = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    along = list(bell / bell.sum())
     volume = np.ascontiguousarray(plane, np.float64)[np.newaxis]
-    return _unsmear.correlate_separable(volume, [[1.0], along, along], "replicate")[0]
+    taps = [[1.0], along, along]
+    return np.asarray(_unsmear.correlate_separable(volume, taps, "replicate")[0])

@@ -71,7 +71,7 @@ class Source:
 
     def frame(self, index: int) -> NDArray[Any]:
         """Return a frame (H, W, C) as it came."""
-        return self._frames[index]
+        return np.asarray(self._frames[index])
 
     def planes(self, index: int) -> NDArray[np.float32]:
         """Return a frame's channels (C, H, W), grey levels; NaN = unknown."""

@@ -105,15 +105,15 @@ def choose_strength(
     The twins themselves are smooth, which favours smoothness: hence the least. Never
     below half of what the noise alone asks for.
     """
-    floor = LEAST_STRENGTH * noise**1.5
+    floor = LEAST_STRENGTH * float(noise) ** 1.5
     best = min(scores)
     if not np.isfinite(best):
-        return max(float(np.sqrt(strengths[0] * strengths[1])), floor)
+        return max((strengths[0] * strengths[1]) ** 0.5, floor)
     limit = TOLERANCE * best
     first = next(k for k, value in enumerate(scores) if value <= limit)
     if first == 0:
         return max(strengths[0], floor)
     before, at = scores[first - 1], scores[first]
     share = (before - limit) / (before - at)
-    logs = np.log(strengths[first - 1]), np.log(strengths[first])
-    return max(float(np.exp(logs[0] + share * (logs[1] - logs[0]))), floor)
+    step = strengths[first] / strengths[first - 1]
+    return max(strengths[first - 1] * step**share, floor)

@@ -74,7 +74,7 @@ def judge(
     labels, count = _unsmear.regions(against.moving)
     share = np.zeros(blurred.shape)
     limit = LIMITS[status]
-    found = []
+    found: list[dict[str, Any]] = []
     for number in range(1, count + 1):
         region = labels == number
         pixels = int(region.sum())
@@ -92,7 +92,7 @@ def judge(
     report = {
         "ratio": _plain(ratio),
         "limit": limit,
-        "regions": sorted(found, key=lambda one: -int(one["pixels"])),
+        "regions": sorted(found, key=lambda one: -one["pixels"]),
         "used_share": float((share > 0).mean()),
         **_words(ratio, found, status, limit),
     }
@@ -121,7 +121,7 @@ def _locally(
     ]
     local = np.sqrt(parts[0] / np.maximum(parts[1], 1e-9 * weight))
     low, high = LOCAL_LIMIT
-    return np.clip((high - local) / (high - low), 0.0, 1.0)
+    return np.asarray(np.clip((high - local) / (high - low), 0.0, 1.0))
 
 
 def _words(
@@ -132,16 +132,20 @@ def _words(
     if not found:
         text = "left as is: nothing moves enough to be blurred"
     elif not used:
-        text = f"left as is: restored frames disagree (ratio {ratio:.2f}, at most {limit})"
+        text = (
+            f"left as is: restored frames disagree (ratio {ratio:.2f}, at most {limit})"
+        )
         if status == "unsure":
             text += " and the exposure could not be found with certainty"
     elif len(used) < len(found):
-        text = f"restored {len(used)} of {len(found)} moving regions, the rest as it was"
+        text = (
+            f"restored {len(used)} of {len(found)} moving regions, the rest as it was"
+        )
     else:
         text = "restored"
     gain = None
     if used and np.isfinite(ratio):
-        # Equal, independent errors of both restorations: e_x = 2 s^2, e_b = s_b^2 + s^2.
+        # Both restorations err by s, independently: e_x = 2 s^2, e_b = b^2 + s^2.
         gain = round(float(10 * np.log10(max(2 / ratio**2 - 1, 0.1))), 1)
     risk = "none" if not used else "low"
     if used and (not np.isfinite(ratio) or ratio > HIGH_RISK):
