@@ -1,7 +1,18 @@
 """Velocity and acceleration of every frame of a clip, from the flows both ways.
 
-At the ends of a clip one flow is missing; the acceleration of the neighbour, read off
-where the content came from, stands in for it.
+With d_k where the content of a frame is k frames later, two flows give v = (d_1 -
+d_-1) / 2 and A = d_1 + d_-1, wrong by a sixth of the jerk and a twelfth of what
+follows. Hands shake fast enough for that to matter: at four frames a turn it is a third
+of the velocity. With the flows of the neighbours, d_2 = d_1 + f(p + d_1), the errors of
+order three go,
+
+    v += (2 (d_1 - d_-1) - (d_2 - d_-2)) / 12
+    A += (4 (d_1 + d_-1) - (d_2 + d_-2)) / 12,
+
+or, with three frames on one side only, v += (3 d_1 + d_-1 - d_2) / 6. The corrections
+are smoothed by a Gaussian of 8 px, which also carries them to where a neighbour's flow
+is not known. At the ends of a clip one flow is missing; the acceleration of the
+neighbour, read off where the content came from, stands in for it.
 """
 
 from __future__ import annotations
@@ -13,7 +24,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.flow import optical_flow
-from unsmear.restoration.sampling import pulled_field
+from unsmear.restoration.sampling import composed, pulled_field, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +36,11 @@ if TYPE_CHECKING:
     Field = NDArray[np.float32]
 
 __all__ = ["ClipMotion", "Motion"]
+
+SMOOTHING = 8.0
+LEAST_KNOWN = 1e-3
+GREATEST_CORRECTION = 0.6
+"""Of the speed, plus 1 px: beyond it a neighbour's flow belongs to something else."""
 
 
 @dataclass(frozen=True)
@@ -106,4 +122,40 @@ class ClipMotion:
             assert way is not None, "a frame of a clip has a neighbour"
             given = pulled_field(self.motion(neighbour).acceleration, way)
         velocity, acceleration = _unsmear.frame_motion(forward, backward, given)
+        if forward is not None and backward is not None:
+            after = self.flow(index + 1, index + 2)
+            before = self.flow(index - 1, index - 2)
+            change, bend = _third_order(forward, backward, after, before)
+            velocity = velocity + _carried_on(change, velocity)
+            acceleration = acceleration + _carried_on(bend, velocity)
         return Motion(velocity, acceleration, forward, backward)
+
+
+def _third_order(
+    one: Field, back: Field, after: Field | None, before: Field | None
+) -> tuple[Field, Field]:
+    """Return the corrections of velocity and acceleration; NaN where not known."""
+    two = None if after is None else composed(one, after)
+    back_two = None if before is None else composed(back, before)
+    none = np.zeros_like(one)
+    if two is not None and back_two is not None:
+        change = (2 * (one - back) - (two - back_two)) / 12
+        return change, (4 * (one + back) - (two + back_two)) / 12
+    if two is not None:
+        return (3 * one + back - two) / 6, none
+    if back_two is not None:
+        return -(3 * back + one - back_two) / 6, none
+    return none, none
+
+
+def _carried_on(correction: Field, velocity: Field) -> Field:
+    """Return a correction smoothed, and carried on to where it is not known."""
+    limit = 1 + GREATEST_CORRECTION * np.linalg.norm(velocity, axis=-1)
+    known = np.linalg.norm(correction, axis=-1) < limit  # false for NaN
+    weight = smoothed(known.astype(np.float64), SMOOTHING)
+    parts = [
+        smoothed(np.where(known, correction[..., part], 0.0), SMOOTHING)
+        for part in range(2)
+    ]
+    mean = np.stack(parts, axis=-1) / np.maximum(weight, LEAST_KNOWN)[..., np.newaxis]
+    return np.asarray(mean, np.float32)
