@@ -8,25 +8,31 @@ from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
 from unsmear.deblur import DeblurResult, deblur
 from unsmear.demo_clip import DemoClip, demo_clip
+from unsmear.exposure import ExposureEstimate, estimate_exposure
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
 from unsmear.motions import Motion, several_motions, velocity_votes
 from unsmear.psf import fspecial_motion, motion_psf
+from unsmear.sequence import SequenceResult, deblur_sequence
 from unsmear.sequences import read_frames, write_frames
 
 __all__ = [
     "ComponentVelocities",
     "DeblurResult",
     "DemoClip",
+    "ExposureEstimate",
     "FlowFileError",
     "FlowResult",
     "Motion",
+    "SequenceResult",
     "__version__",
     "blur",
     "component_velocities",
     "deblur",
+    "deblur_sequence",
     "demo_clip",
+    "estimate_exposure",
     "fspecial_motion",
     "get_num_threads",
     "metrics",

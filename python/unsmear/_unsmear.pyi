@@ -235,6 +235,51 @@ def thesis_deblur(
     progress: _Progress | None = None,
 ) -> tuple[_Double, int]: ...
 
+# How long the shutter was open.
+
+class _Exposure(TypedDict):
+    value: float
+    status: Literal["ok", "unsure", "small"]
+    vote: float
+    spread: float
+    tiles: int
+    likeliest: float
+    noise: float
+
+def estimate_exposure(
+    images: _Single,
+    velocities: _Single,
+    accelerations: _Single | None,
+    limits: tuple[float, float],
+    noise: float | None,
+    seed: int,
+    of_content: bool = False,
+    progress: _Progress | None = None,
+) -> _Exposure: ...
+
+# Parts of the restoration of clips.
+
+def looks_reach(looks: Sequence[Mapping[str, Any]]) -> int: ...
+def restore_looks(
+    looks: Sequence[Mapping[str, Any]],
+    pad: int,
+    lambdas: Sequence[float],
+    robust: float,
+    first: tuple[int, int],
+    following: tuple[int, int],
+    start: _Single | None = None,
+    progress: _Progress | None = None,
+) -> tuple[list[_Single], list[float]]: ...
+def record_look(look: Mapping[str, Any], x: _Single, pad: int) -> _Single: ...
+def frame_motion(
+    forward: _Single | None = None,
+    backward: _Single | None = None,
+    acceleration: _Single | None = None,
+) -> tuple[_Single, _Single]: ...
+def visibility(velocity: _Single, exposure: float) -> _Single: ...
+def regions(mask: NDArray[np.bool_]) -> tuple[NDArray[np.uint32], int]: ...
+def dilated(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]: ...
+
 # Metrics.
 
 def error_map(name: str, flow: _Double, truth: _Double) -> _Double: ...

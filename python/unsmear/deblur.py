@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
+from unsmear.exposure import estimate_exposure
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -50,7 +51,7 @@ def deblur(
     image: ArrayLike,
     flow: ArrayLike,
     *,
-    exposure: float = 1.0,
+    exposure: float | Literal["auto"] = 1.0,
     method: str = "tv",
     acceleration: ArrayLike | None = None,
     weights: ArrayLike | None = None,
@@ -70,8 +71,10 @@ def deblur(
     flow : array_like of shape (H, W, 2)
         Velocity ``(u, v)`` at mid-exposure, px/frame, x to the right, y downwards.
         Pixels of unknown (NaN) motion are copied, and counted in the report.
-    exposure : float, default 1.0
-        Fraction of the frame interval the shutter was open; > 0.
+    exposure : float or "auto", default 1.0
+        Fraction of the frame interval the shutter was open; > 0. "auto" finds it, and
+        with it a common error in the length of the flow, in the blur of the picture;
+        see `unsmear.estimate_exposure`.
     method : str, default "tv"
         "tv": total variation through the exact operator of the motion; best of all in
         every case measured. "fast": the same with less than half the iterations, about
@@ -167,6 +170,18 @@ def deblur(
     if method not in METHODS:
         names = ", ".join(repr(name) for name in METHODS)
         raise ValueError(f"method must be one of {names}, got {method!r}")
+    found = None
+    if isinstance(exposure, str):
+        if exposure != "auto":
+            raise ValueError(f"exposure must be 'auto' or a number, got {exposure!r}")
+        found = estimate_exposure(
+            image,
+            flow,
+            acceleration=acceleration,
+            noise=noise,
+            channel_axis=channel_axis,
+        )
+        exposure = found.value
     if not (np.isfinite(exposure) and exposure > 0):
         raise ValueError(f"exposure must be finite and positive, got {exposure}")
     exposure = float(exposure)
@@ -200,4 +215,11 @@ def deblur(
         "version": _unsmear.__version__,
     }
     report["warnings"] = _deblur_methods.warnings_of(report)
+    if found is not None:
+        report["exposure_found"] = found.report()
+        if found.status != "ok":
+            report["warnings"].append(
+                f"the exposure could not be found with certainty ({found.status}): "
+                f"{exposure:.2f} was assumed"
+            )
     return DeblurResult(channels.restore(planes), report)

@@ -9,12 +9,14 @@ mod component_velocity;
 mod convolve;
 mod deblur;
 mod errors;
+mod exposure;
 mod flow;
 mod interpolate;
 mod metrics;
 mod motion_deblur;
 mod parameters;
 mod psf;
+mod restoration;
 mod thesis;
 mod threads;
 
@@ -35,6 +37,8 @@ mod _unsmear {
     #[pymodule_export]
     use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
     #[pymodule_export]
+    use crate::exposure::estimate_exposure;
+    #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
     #[pymodule_export]
     use crate::interpolate::sample;
@@ -44,6 +48,10 @@ mod _unsmear {
     use crate::motion_deblur::{motion_deblur_f32, motion_deblur_f64};
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
+    #[pymodule_export]
+    use crate::restoration::{
+        dilated, frame_motion, looks_reach, record_look, regions, restore_looks, visibility,
+    };
     #[pymodule_export]
     use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]

@@ -33,6 +33,12 @@
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
+//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random` | parts of the search for the exposure |
+//! | 13 | `exposure::tile` | |
+//! | 14 | `exposure::tile_choice`, `exposure::likelihood` | |
+//! | 15 | `exposure::vote` | |
+//! | 16 | `exposure::search` | |
+//! | 17 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
 //! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::lanes` | parts of the operator; one kernel for the whole picture |
 //! | 13 | `motion_operator::plan` | |
@@ -48,6 +54,8 @@
 //! | 19 | `deblur::tikhonov`, `deblur::richardson_lucy` | |
 //! | 20 | `deblur::motion_deblur` | any of these three on one picture |
 //! | 21 | [`deblur`] | their names |
+//! | 22 | `restoration::frame_motion`, `restoration::regions`, `restoration::walk` | parts of the restoration of clips |
+//! | 23 | [`restoration`] | their names |
 //! | 22 | [`metrics`] | how far an estimate is from the truth |
 //!
 //! Conventions: row-major frames (T, H, W); x to the right, y downwards; flow in px/frame; NaN = unknown; spatial
@@ -65,6 +73,7 @@ pub mod deblur;
 mod demodulation;
 pub mod error;
 mod even_odd;
+pub mod exposure;
 pub mod fft_convolve;
 pub mod flow;
 pub mod flow_field;
@@ -85,6 +94,7 @@ pub mod phase_rate;
 pub mod psf;
 pub mod pyramid;
 pub mod real;
+pub mod restoration;
 mod smoothing;
 pub mod sor;
 pub mod spatiotemporal;

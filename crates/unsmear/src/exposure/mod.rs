@@ -1,0 +1,204 @@
+//! How long the shutter was open, read from the blur itself.
+//!
+//! Flow v says how far things move in a frame interval; the share s of it during which light was gathered leaves
+//! zeros in the spectrum of each part of a blurred picture, at waves with w . (s v) = 2 pi n. One s is sought for a
+//! whole picture or clip:
+//!
+//! 1. tiles of 64 px (48 or 32 in small pictures) with one motion and enough contrast (`tile.rs`);
+//! 2. for each, Whittle's likelihood over a grid of s and twelve shapes of the scene's spectrum (`likelihood.rs`),
+//!    with paths of constant acceleration (`path_spectrum.rs`); tiles whose blur at s is shorter than 2.4 px have no
+//!    zero in the band and are left out;
+//! 3. the sum decides, then a finer grid around its optimum; shapes vote and tiles are resampled (`vote.rs`).
+//!
+//! s also takes up a common error of scale of the flow: what is found is the blur, s v. Trust: "ok" when 60 % of the
+//! shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
+//! the shapes' optima kept in 0.4 .. 1, for blur assumed too short does little harm and blur assumed too long does
+//! much. Without any tile s is 0.8; "small" says that this is because hardly anything moves by 3 px.
+//!
+//! Validity: noise of known deviation, in the picture's units, white in the band; blur of 2.4 to about 60 px; no
+//! strong sharpening (it fills the zeros). Units: px, frames, rad/px.
+
+mod frame;
+mod likelihood;
+mod path_spectrum;
+mod random;
+mod search;
+mod tile;
+mod tile_choice;
+mod vote;
+
+pub use self::frame::ExposureFrame;
+use self::random::Random;
+use self::search::{LEAST_BLUR, search};
+use self::tile::Waves;
+use self::tile_choice::{choose_tiles, tile_side};
+use self::vote::vote;
+use crate::array::require_same;
+use crate::control::Control;
+use crate::error::{Error, Result, require};
+use crate::noise::estimate_noise;
+use crate::real::Real;
+
+/// Searched beyond either end of the range, so that an optimum outside is seen to be outside.
+const MARGIN: f64 = 1.17;
+
+/// Steps of the grey scale of 8 bits, whose rounding is the least noise supposed.
+const GREY_LEVELS: f64 = 255.0;
+
+/// Least vote and greatest spread of an estimate to be relied on.
+const TRUST: (f64, f64) = (0.6, 0.12);
+
+/// Range of s while unsure.
+const UNSURE: (f64, f64) = (0.4, 1.0);
+
+/// s when nothing tells.
+const PRIOR: f64 = 0.8;
+
+/// Speed whose 95 % quantile below it explains that no tile tells anything, px/frame.
+const SMALL: f64 = 3.0;
+
+/// Parameters of the search; see the [module](self).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExposureSearch {
+    /// Least and greatest share sought.
+    pub range: (f64, f64),
+    /// Deviation of the noise, >= 0, in the units of the pictures; None: measured. Never taken as less than what
+    /// storing in 8 bits adds.
+    pub noise: Option<f64>,
+    /// Seed of the choice of tiles and of their resampling.
+    pub seed: u64,
+}
+
+/// Whether an estimate can be relied on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExposureStatus {
+    /// Shapes and tiles agree.
+    Ok,
+    /// They do not, or nothing could be measured.
+    Unsure,
+    /// Too little motion to tell, and to matter.
+    Small,
+}
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExposureEstimate {
+    /// Share of the frame interval.
+    pub value: f64,
+    /// Whether to rely on it.
+    pub status: ExposureStatus,
+    /// Share of the shapes that agree; NaN without tiles.
+    pub vote: f64,
+    /// Deviation of log s over resamplings; NaN without tiles.
+    pub spread: f64,
+    /// Tiles used.
+    pub tiles: usize,
+    /// What the likelihood alone says; NaN without tiles.
+    pub likeliest: f64,
+    /// Noise used, in the units of the pictures.
+    pub noise: f64,
+}
+
+impl ExposureSearch {
+    /// One share for all `frames`.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for no frames, a range or noise that is not positive; [`Error::Shape`] when shapes differ;
+    /// [`Error::Cancelled`].
+    pub fn estimate<T: Real>(
+        &self,
+        frames: &[ExposureFrame<'_, T>],
+        control: &Control,
+    ) -> Result<ExposureEstimate> {
+        self.validate(frames)?;
+        let (height, width) = frames[0].image.dim();
+        let mut random = Random::new(self.seed);
+        let beyond = (self.range.0 / MARGIN, self.range.1 * MARGIN);
+        let noise = self.noise_used(frames, control)?;
+        let nothing = || Ok(without_tiles(frames, noise));
+        let (Some(side), true) = (tile_side(height.min(width)), noise > 0.0) else {
+            return nothing();
+        };
+        let waves = Waves::new(side);
+        let least_speed = LEAST_BLUR / beyond.1;
+        let tiles = choose_tiles(frames, &waves, noise, least_speed, &mut random, control)?;
+        if tiles.is_empty() {
+            return nothing();
+        }
+        let Some(found) = search(&tiles, &waves, beyond, noise, &mut random, control)? else {
+            return nothing();
+        };
+        let agreement = vote(&found.of_shapes, found.log_scale);
+        let (likeliest, spread, tiles) = (found.log_scale.exp(), found.spread, found.tiles);
+        let credible = found.inside && (self.range.0..=self.range.1).contains(&likeliest);
+        let (value, status) = if credible && agreement >= TRUST.0 && spread <= TRUST.1 {
+            (likeliest, ExposureStatus::Ok)
+        } else {
+            (median(found.of_shapes).exp().clamp(UNSURE.0, UNSURE.1), ExposureStatus::Unsure)
+        };
+        Ok(ExposureEstimate { value, status, vote: agreement, spread, tiles, likeliest, noise })
+    }
+
+    fn validate<T: Real>(&self, frames: &[ExposureFrame<'_, T>]) -> Result<()> {
+        if let Some(noise) = self.noise {
+            require("noise", noise, "finite and not negative", |n| n >= 0.0)?;
+        }
+        require("limits", self.range.0, "finite and positive", |s| s > 0.0)?;
+        require("limits", self.range.1, "increasing", |s| s > self.range.0)?;
+        let Some(first) = frames.first() else {
+            return Err(Error::value("frames", "at least one", 0));
+        };
+        let shape = first.image.dim();
+        frames.iter().try_for_each(|frame| {
+            require_same("frames", &frame.image, shape)?;
+            require_same("flow", &frame.velocity.u, shape)?;
+            require_same("acceleration", &frame.curvature.u, shape)
+        })
+    }
+    /// Noise given or measured (median over the frames), at least that of 8 bits.
+    fn noise_used<T: Real>(
+        &self,
+        frames: &[ExposureFrame<'_, T>],
+        control: &Control,
+    ) -> Result<f64> {
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let samples = frames.iter().flat_map(|frame| frame.image.into_iter());
+        samples.map(|sample| sample.as_f64()).filter(|sample| sample.is_finite()).for_each(|s| {
+            (least, most) = (least.min(s), most.max(s));
+        });
+        let rounding = ((most - least) / GREY_LEVELS / 12f64.sqrt()).max(0.0);
+        let noise = match self.noise {
+            Some(noise) => noise,
+            None => {
+                let of_frame = |frame: &ExposureFrame<'_, T>| {
+                    estimate_noise(&frame.image, &frame.velocity, 1.0, control)
+                };
+                median(frames.iter().map(of_frame).collect::<Result<Vec<_>>>()?)
+            }
+        };
+        Ok(noise.max(rounding))
+    }
+}
+
+/// The estimate when no tile tells anything.
+fn without_tiles<T: Real>(frames: &[ExposureFrame<'_, T>], noise: f64) -> ExposureEstimate {
+    let speeds = frames.iter().flat_map(|frame| {
+        let motion = frame.velocity.u.into_iter().zip(frame.velocity.v);
+        motion.map(|(u, v)| u.as_f64().hypot(v.as_f64())).filter(|speed| speed.is_finite())
+    });
+    let (slow, all) = speeds
+        .fold((0usize, 0usize), |(slow, all), speed| (slow + usize::from(speed < SMALL), all + 1));
+    let small = slow * 20 >= all * 19;
+    let status = if small { ExposureStatus::Small } else { ExposureStatus::Unsure };
+    let (vote, spread, likeliest) = (f64::NAN, f64::NAN, f64::NAN);
+    ExposureEstimate { value: PRIOR, status, vote, spread, tiles: 0, likeliest, noise }
+}
+
+fn median(values: impl Into<Vec<f64>>) -> f64 {
+    let mut values = values.into();
+    values.sort_unstable_by(f64::total_cmp);
+    (values[(values.len() - 1) / 2] + values[values.len() / 2]) / 2.0
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! The search over the scale of the blur: a coarse grid, the tiles long enough at its optimum, a fine grid.
+
+use rayon::prelude::*;
+
+use super::likelihood::{SHAPES, SceneSpectra, curves};
+use super::path_spectrum::PathSpectrum;
+use super::random::Random;
+use super::tile::{Tile, Waves};
+use super::vote::{Optimum, optimum, spread};
+use crate::control::Control;
+use crate::error::Result;
+
+/// Shortest blur with a zero in the band, px.
+pub(super) const LEAST_BLUR: f64 = 2.4;
+
+/// Step of the first grid in log s, and of the finer one.
+const STEPS: [f64; 2] = [0.095, 0.02];
+
+/// Steps of the finer grid to either side.
+const FINE: i32 = 6;
+
+/// Rounds of leaving out tiles too short at the s found.
+const GATES: usize = 4;
+
+/// Greatest frequency of the likelihood, rad/px, for the extent of the table.
+const GREATEST_FREQUENCY: f64 = 2.8;
+
+/// What the tiles say.
+pub(super) struct Found {
+    /// Log of the likeliest scale.
+    pub(super) log_scale: f64,
+    /// Whether it lies within the range searched, not at its end.
+    pub(super) inside: bool,
+    /// Own optimum of each shape of the scene's spectrum.
+    pub(super) of_shapes: [f64; SHAPES],
+    /// Deviation over resamplings of the tiles.
+    pub(super) spread: f64,
+    /// Tiles used.
+    pub(super) tiles: usize,
+}
+
+/// Searches `range`; None when no tile is long enough.
+pub(super) fn search(
+    tiles: &[Tile],
+    waves: &Waves,
+    range: (f64, f64),
+    noise: f64,
+    random: &mut Random,
+    control: &Control,
+) -> Result<Option<Found>> {
+    let likelihoods = Likelihoods::new(tiles, waves, range.1, noise, control)?;
+    let (first, octaves) = (range.0.ln(), (range.1 / range.0).ln());
+    let steps = (octaves / STEPS[0]).ceil();
+    let grid: Vec<f64> = (0..=steps as usize).map(|i| first + i as f64 / steps * octaves).collect();
+    let all = likelihoods.curves(&grid)?;
+    let Some((coarse, used)) = gated(&all, tiles, &grid) else { return Ok(None) };
+    let log_scale = if coarse.inside {
+        let fine: Vec<f64> =
+            (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
+        let refined = likelihoods.curves(&fine)?;
+        optimum(used.iter().map(|&i| refined[i].as_slice()), &fine).log_scale
+    } else {
+        coarse.log_scale
+    };
+    let chosen: Vec<&[f64]> = used.iter().map(|&i| all[i].as_slice()).collect();
+    let spread = spread(&chosen, &grid, random);
+    let Optimum { inside, of_shapes, .. } = coarse;
+    Ok(Some(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
+}
+
+/// Likelihoods of the tiles on any grid.
+struct Likelihoods<'a> {
+    tiles: &'a [Tile],
+    waves: &'a Waves,
+    scenes: SceneSpectra,
+    table: PathSpectrum,
+    noise: f64,
+    control: &'a Control,
+}
+
+impl<'a> Likelihoods<'a> {
+    fn new(
+        tiles: &'a [Tile],
+        waves: &'a Waves,
+        most_scale: f64,
+        noise: f64,
+        control: &'a Control,
+    ) -> Result<Self> {
+        control.check()?;
+        let points = tiles.iter().flat_map(|tile| &tile.points);
+        let greatest =
+            points.map(|p| f64::from(p.curvature[0].hypot(p.curvature[1]))).fold(0.0, f64::max);
+        let table = PathSpectrum::new(greatest * most_scale.powi(2) * GREATEST_FREQUENCY);
+        let scenes = SceneSpectra::new(waves);
+        Ok(Self { tiles, waves, scenes, table, noise, control })
+    }
+
+    fn curves(&self, log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
+        let scales: Vec<f64> = log_scales.iter().map(|s| s.exp()).collect();
+        self.control.expect(self.tiles.len());
+        let of_tile = |tile: &Tile| {
+            self.control.advance()?;
+            Ok(curves(tile, self.waves, &self.scenes, &self.table, &scales, self.noise))
+        };
+        self.tiles.par_iter().map(of_tile).collect()
+    }
+}
+
+/// The optimum of the tiles long enough at it, and which these are; None when there are none.
+fn gated(curves: &[Vec<f64>], tiles: &[Tile], grid: &[f64]) -> Option<(Optimum, Vec<usize>)> {
+    let long_enough = |log_scale: f64| -> Vec<usize> {
+        (0..tiles.len()).filter(|&i| tiles[i].speed * log_scale.exp() > LEAST_BLUR).collect()
+    };
+    let best = |used: &[usize]| optimum(used.iter().map(|&i| curves[i].as_slice()), grid);
+    let mut used = long_enough(grid[grid.len() - 1].min(0.0));
+    if used.is_empty() {
+        return None;
+    }
+    let mut found = best(&used);
+    for _ in 1..GATES {
+        let next = long_enough(found.log_scale);
+        if next == used || next.is_empty() {
+            break;
+        }
+        used = next;
+        found = best(&used);
+    }
+    Some((found, used))
+}

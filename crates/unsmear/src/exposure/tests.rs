@@ -1,0 +1,90 @@
+//! The search on pictures whose blur is known exactly.
+
+use std::f64::consts::TAU;
+
+use ndarray::Array2;
+
+use super::*;
+use crate::flow_field::FlowField;
+
+const SHAPE: (usize, usize) = (160, 160);
+
+/// Waves of all directions with the amplitudes of natural pictures, each passed by its blur: exact, without sampling.
+fn blurred(length: f64, angle: f64, noise: f64) -> Array2<f64> {
+    let mut random = Random::new(5);
+    let mut unit = || random.below(1 << 40) as f64 / (1u64 << 40) as f64;
+    let (vx, vy) = (length * angle.cos(), length * angle.sin());
+    let mut picture = Array2::<f64>::zeros(SHAPE);
+    for _ in 0..1200 {
+        let radius = 0.05 * (unit() * 4.1).exp();
+        let (direction, phase) = (TAU * unit(), TAU * unit());
+        let (wx, wy) = (radius * direction.cos(), radius * direction.sin());
+        let half = (wx * vx + wy * vy) / 2.0;
+        // Equal power per octave: the spectrum 1 / radius^2 of the plane.
+        let amplitude = 3.0 * if half == 0.0 { 1.0 } else { half.sin() / half };
+        picture.indexed_iter_mut().for_each(|((y, x), sample)| {
+            *sample += amplitude * (wx * x as f64 + wy * y as f64 + phase).cos();
+        });
+    }
+    picture.mapv_inplace(|sample| sample + noise * 12f64.sqrt() * (unit() - 0.5));
+    picture
+}
+
+fn constant(u: f64, v: f64) -> FlowField<f64> {
+    FlowField::new(Array2::from_elem(SHAPE, u), Array2::from_elem(SHAPE, v)).unwrap()
+}
+
+fn found(image: &Array2<f64>, flow: &FlowField<f64>, range: (f64, f64)) -> ExposureEstimate {
+    let still = constant(0.0, 0.0);
+    let frame =
+        ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
+    ExposureSearch { range, noise: None, seed: 1 }.estimate(&[frame], &Control::new()).unwrap()
+}
+
+#[test]
+fn finds_the_length_of_blur_whatever_the_flow_says() {
+    let image = blurred(9.0, 0.6, 0.5);
+    for scale in [0.5, 1.0, 1.5] {
+        let flow = constant(scale * 9.0 * 0.6f64.cos(), scale * 9.0 * 0.6f64.sin());
+        let estimate = found(&image, &flow, (0.4, 2.5));
+        assert_eq!(estimate.status, ExposureStatus::Ok);
+        // A few tiles of a texture of lines, not of a dense spectrum: 2 %; a wrong half of a pixel would be 6 %.
+        assert!((estimate.value * scale - 1.0).abs() < 0.02, "{scale}: {}", estimate.value);
+    }
+}
+
+#[test]
+fn contrast_and_brightness_do_not_matter() {
+    let image = blurred(9.0, 0.6, 0.5);
+    let flow = constant(9.0 * 0.6f64.cos(), 9.0 * 0.6f64.sin());
+    let estimate = found(&image, &flow, (0.4, 2.5));
+    let other = found(&image.mapv(|sample| 0.004 * sample + 3.0), &flow, (0.4, 2.5));
+    // Rounding alone differs.
+    assert!((estimate.value / other.value - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn says_when_it_cannot_know() {
+    let image = blurred(9.0, 0.6, 0.5);
+    let slow = found(&image, &constant(0.5, 0.0), (0.4, 1.25));
+    assert_eq!((slow.status, slow.value, slow.tiles), (ExposureStatus::Small, PRIOR, 0));
+    let flat = found(&Array2::zeros(SHAPE), &constant(9.0, 0.0), (0.4, 1.25));
+    assert_eq!((flat.status, flat.value), (ExposureStatus::Unsure, PRIOR));
+    // The blur is 1.7 of what the flow says: beyond what a shutter can do.
+    let outside = found(&image, &constant(5.2 * 0.6f64.cos(), 5.2 * 0.6f64.sin()), (0.35, 1.25));
+    assert_eq!(outside.status, ExposureStatus::Unsure);
+    assert!((UNSURE.0..=UNSURE.1).contains(&outside.value));
+}
+
+#[test]
+fn names_what_is_wrong() {
+    let frames: [ExposureFrame<'_, f64>; 0] = [];
+    let search = ExposureSearch { range: (0.4, 1.25), noise: None, seed: 0 };
+    assert!(search.estimate(&frames, &Control::new()).is_err());
+    let (image, flow) = (Array2::zeros(SHAPE), constant(1.0, 1.0));
+    let frame =
+        ExposureFrame { image: image.view(), velocity: flow.view(), curvature: flow.view() };
+    let search = ExposureSearch { range: (1.0, 0.5), ..search };
+    let error = search.estimate(&[frame], &Control::new()).unwrap_err();
+    assert!(error.to_string().contains("limits"), "{error}");
+}

@@ -1,0 +1,207 @@
+//! Tiles of a picture in which the length of blur can be read: spectrum, motion and its spread.
+//!
+//! A tile of T x T px under a Hann window of mean square 1 has the periodogram P(w) = |DFT|^2 / T^2, whose mean for
+//! white noise of deviation sigma is sigma^2. Its motion is sampled at nine points, weighted as the window does, as
+//! means over squares of T/5: blur that varies over the tile smears the zeros of its spectrum. Dropped are tiles with unknown pixels, with more than a tenth unknown motion, whose motion varies by more
+//! than 0.35 of itself, and those without contrast.
+
+use std::f64::consts::{PI, TAU};
+
+use ndarray::{ArrayView2, s};
+
+use super::frame::ExposureFrame;
+use crate::fourier::{Complex64, Fft2};
+use crate::real::Real;
+
+/// Least frequency used, in steps of the tile's transform: below it the window's main lobe brings in the mean.
+const LEAST_STEPS: f64 = 2.5;
+
+/// Greatest frequency used, rad/px: beyond it cameras, codecs and demosaicking shape the spectrum.
+const GREATEST: f64 = 2.7;
+
+/// Greatest spread of a tile's motion, as a share of its length.
+const GREATEST_SPREAD: f64 = 0.35;
+
+/// Greatest share of a tile's pixels whose motion may be unknown.
+const GREATEST_UNKNOWN: f64 = 0.1;
+
+/// Least mean power of a tile in units of the noise's: below it the spectrum shows the noise.
+const LEAST_POWER: f64 = 20.0;
+
+/// Points per axis: the three-point Gauss rule for a bell of the window's variance, (0.141 T)^2.
+const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1.0 / 6.0)];
+
+/// Number of points.
+pub(super) const POINTS: usize = NODES.len() * NODES.len();
+
+/// The waves at which tiles of one size are compared: half a plane, for a picture's spectrum is symmetric.
+pub(super) struct Waves {
+    /// Side T of the tiles, px.
+    pub(super) side: usize,
+    /// Frequency to the right, rad/px.
+    pub(super) x: Vec<f32>,
+    /// Frequency downwards, rad/px.
+    pub(super) y: Vec<f32>,
+    bins: Vec<usize>,
+}
+
+impl Waves {
+    pub(super) fn new(side: usize) -> Self {
+        let frequency = |k: usize| {
+            let signed = if k > side / 2 { k as f64 - side as f64 } else { k as f64 };
+            TAU * signed / side as f64
+        };
+        let mut waves = Self { side, x: Vec::new(), y: Vec::new(), bins: Vec::new() };
+        let least = LEAST_STEPS * TAU / side as f64;
+        for bin in 0..side * side {
+            let (y, x) = (frequency(bin / side), frequency(bin % side));
+            let radius = x.hypot(y);
+            if radius > least && radius < GREATEST && (y > 0.0 || (y == 0.0 && x > 0.0)) {
+                waves.bins.push(bin);
+                waves.x.push(x as f32);
+                waves.y.push(y as f32);
+            }
+        }
+        waves
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.bins.len()
+    }
+}
+
+/// Motion at one point of a tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub(super) weight: f32,
+    /// px/frame.
+    pub(super) velocity: [f32; 2],
+    /// px/frame^2.
+    pub(super) curvature: [f32; 2],
+}
+
+/// What one tile contributes.
+pub(super) struct Tile {
+    /// Mean motion, px/frame.
+    pub(super) velocity: [f64; 2],
+    /// Its length, px/frame.
+    pub(super) speed: f64,
+    pub(super) points: Vec<Point>,
+    /// Periodogram at the waves, in squares of the picture's units.
+    pub(super) power: Vec<f64>,
+}
+
+impl Tile {
+    /// The tile with its corner at (top, left), unless it tells nothing.
+    pub(super) fn new<T: Real>(
+        frame: &ExposureFrame<'_, T>,
+        [top, left]: [usize; 2],
+        waves: &Waves,
+        noise: f64,
+        plan: &Fft2,
+    ) -> Option<Self> {
+        let side = waves.side;
+        let part = s![top..top + side, left..left + side];
+        let fields = [&frame.velocity.u, &frame.velocity.v].map(|field| field.slice(part));
+        let [(u, spread_u), (v, spread_v)] = [moments(&fields[0])?, moments(&fields[1])?];
+        let speed = u.hypot(v);
+        if !(spread_u.hypot(spread_v) < GREATEST_SPREAD * speed) {
+            return None;
+        }
+        let power = periodogram(&frame.image.slice(part), waves, plan)?;
+        let mean = power.iter().sum::<f64>() / power.len() as f64;
+        if !(mean > LEAST_POWER * noise * noise) {
+            return None;
+        }
+        let curves = [&frame.curvature.u, &frame.curvature.v].map(|field| field.slice(part));
+        let (radius, last) = ((side / 10) as f64, side - 1);
+        let around = |node: f64| {
+            let centre = (0.5 + node) * last as f64;
+            (centre - radius).round() as usize..=(centre + radius).round() as usize
+        };
+        let mut points = Vec::with_capacity(POINTS);
+        for (y, weight_y) in NODES {
+            for (x, weight_x) in NODES {
+                let square = s![around(y), around(x)];
+                let mean = |field: &ArrayView2<'_, T>| {
+                    moments(&field.slice(square)).map(|(mean, _)| mean as f32)
+                };
+                points.push(Point {
+                    weight: (weight_y * weight_x) as f32,
+                    velocity: [mean(&fields[0])?, mean(&fields[1])?],
+                    curvature: [mean(&curves[0])?, mean(&curves[1])?],
+                });
+            }
+        }
+        Some(Self { velocity: [u, v], speed, points, power })
+    }
+}
+
+/// Mean and deviation of the known samples; None when too many are unknown.
+fn moments<T: Real>(samples: &ArrayView2<'_, T>) -> Option<(f64, f64)> {
+    let known = || samples.iter().map(|s| s.as_f64()).filter(|s| s.is_finite());
+    let count = known().count() as f64;
+    if count < (1.0 - GREATEST_UNKNOWN) * samples.len() as f64 {
+        return None;
+    }
+    let mean = known().sum::<f64>() / count;
+    Some((mean, (known().map(|s| (s - mean).powi(2)).sum::<f64>() / count).sqrt()))
+}
+
+/// P(w) at the waves; None when a sample is unknown.
+fn periodogram<T: Real>(tile: &ArrayView2<'_, T>, waves: &Waves, plan: &Fft2) -> Option<Vec<f64>> {
+    let side = waves.side;
+    let area = (side * side) as f64;
+    let mean = tile.iter().map(|s| s.as_f64()).sum::<f64>() / area;
+    if !mean.is_finite() {
+        return None;
+    }
+    // Mean square of sin^2 over whole samples is 3/8, per axis.
+    let hann: Vec<f64> = (0..side)
+        .map(|i| (PI * (i as f64 + 0.5) / side as f64).sin().powi(2) / 0.375f64.sqrt())
+        .collect();
+    let mut spectrum: Vec<Complex64> = tile
+        .indexed_iter()
+        .map(|((y, x), s)| ((s.as_f64() - mean) * hann[y] * hann[x]).into())
+        .collect();
+    plan.forward(&mut spectrum, &mut Vec::new());
+    Some(waves.bins.iter().map(|&bin| spectrum[bin].norm_sqr() / area).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow_field::FlowField;
+    use ndarray::Array2;
+
+    fn field(u: f64, v: f64) -> FlowField<f64> {
+        FlowField::new(Array2::from_elem((64, 64), u), Array2::from_elem((64, 64), v)).unwrap()
+    }
+
+    #[test]
+    fn drops_what_tells_nothing() {
+        let image = Array2::from_shape_fn((64, 64), |(y, x)| ((y * 31 + x * 17) % 23) as f64);
+        let (waves, plan) = (Waves::new(64), Fft2::new(64, 64));
+        let still = field(0.0, 0.0);
+        let tile = |image: &Array2<f64>, velocity: &FlowField<f64>| {
+            let frame = ExposureFrame {
+                image: image.view(),
+                velocity: velocity.view(),
+                curvature: still.view(),
+            };
+            Tile::new(&frame, [0, 0], &waves, 0.3, &plan)
+        };
+        let found = tile(&image, &field(3.0, 4.0)).unwrap();
+        assert!((found.speed - 5.0).abs() < 1e-12);
+        assert!((found.points.iter().map(|p| p.weight).sum::<f32>() - 1.0).abs() < 1e-6);
+        assert!(tile(&Array2::zeros((64, 64)), &field(3.0, 4.0)).is_none(), "no contrast");
+        assert!(tile(&image, &field(f64::NAN, 4.0)).is_none(), "unknown motion");
+        assert!(tile(&image, &still).is_none(), "no motion");
+        let mut two = field(3.0, 4.0);
+        two.u.slice_mut(s![.., ..32]).fill(-3.0);
+        assert!(tile(&image, &two).is_none(), "two motions");
+        let mut holed = image.clone();
+        holed[(9, 9)] = f64::NAN;
+        assert!(tile(&holed, &field(3.0, 4.0)).is_none(), "unknown pixel");
+    }
+}

@@ -1,0 +1,67 @@
+//! Which tiles of the frames are used: a random hundred of those that tell something.
+//!
+//! Corners lie half a tile apart. A fixed seed puts them in an order, in which they are looked at until enough have
+//! been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
+
+use rayon::prelude::*;
+
+use super::frame::ExposureFrame;
+use super::random::Random;
+use super::tile::{Tile, Waves};
+use crate::control::Control;
+use crate::error::Result;
+use crate::fourier::Fft2;
+use crate::real::Real;
+
+/// Most tiles used: beyond it the model, not the number of tiles, limits what is found.
+const MOST_TILES: usize = 100;
+
+/// Tiles looked at together; a fixed number, so that the result does not depend on threads.
+const BATCH: usize = 128;
+
+/// Side of the tiles for a picture whose shorter side is `shorter`, px.
+pub(super) fn tile_side(shorter: usize) -> Option<usize> {
+    match shorter {
+        256.. => Some(64),
+        96.. => Some(48),
+        32.. => Some(32),
+        _ => None,
+    }
+}
+
+/// At most [`MOST_TILES`] tiles faster than `least_speed` (px/frame) that tell something.
+pub(super) fn choose_tiles<T: Real>(
+    frames: &[ExposureFrame<'_, T>],
+    waves: &Waves,
+    noise: f64,
+    least_speed: f64,
+    random: &mut Random,
+    control: &Control,
+) -> Result<Vec<Tile>> {
+    let side = waves.side;
+    let (height, width) = frames[0].image.dim();
+    let starts = |n: usize| (0..=n - side).step_by(side / 2);
+    let mut corners: Vec<(usize, [usize; 2])> = (0..frames.len())
+        .flat_map(|n| starts(height).map(move |top| (n, top)))
+        .flat_map(|(n, top)| starts(width).map(move |left| (n, [top, left])))
+        .collect();
+    random.shuffle(&mut corners);
+    let plan = Fft2::new(side, side);
+    let mut tiles = Vec::new();
+    for batch in corners.chunks(BATCH) {
+        let found: Vec<Option<Tile>> = batch
+            .par_iter()
+            .map(|&(n, corner)| {
+                control.check()?;
+                let tile = Tile::new(&frames[n], corner, waves, noise, &plan);
+                Ok(tile.filter(|tile| tile.speed > least_speed))
+            })
+            .collect::<Result<_>>()?;
+        tiles.extend(found.into_iter().flatten());
+        if tiles.len() >= MOST_TILES {
+            break;
+        }
+    }
+    tiles.truncate(MOST_TILES);
+    Ok(tiles)
+}

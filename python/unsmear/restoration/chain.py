@@ -1,0 +1,268 @@
+"""The order of the steps: one pass over a clip, frame by frame, each step when needed.
+
+A pass measures flow on guide frames and restores data frames. In the first both are
+the clip; in the second, worth its time where the motion changes much from frame to
+frame and so blur differs between frames, the guides are the restored frames of the
+first. Steps are computed when a frame first asks for them and forgotten when no frame
+to come can: memory does not grow with the clip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unsmear import _unsmear
+from unsmear.restoration.clip_exposure import ClipExposure
+from unsmear.restoration.clip_motion import ClipMotion
+from unsmear.restoration.joint import Neighbour, restore_jointly
+from unsmear.restoration.looks import TWIN, WALK, Look, cropped, look, walk
+from unsmear.restoration.memo import Memo
+from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
+from unsmear.restoration.verdict import Verdict, judge
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from unsmear.restoration.source import Source
+
+    Plane = NDArray[np.float32]
+    Planes = NDArray[np.float32]
+
+__all__ = ["Chain", "Restored", "Settings"]
+
+KEPT_BEHIND = 5
+"""Frames that one looks back on, through exposures and twins of its neighbours."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the user may set; see `unsmear.deblur_sequence`."""
+
+    exposure: float | None
+    noise: float | None
+    flow_method: str
+    flow_options: dict[str, Any]
+    joint: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Restored:
+    """A restored frame and how it came about.
+
+    Attributes
+    ----------
+    planes : ndarray of shape (C, H, W), float32
+        Grey levels.
+    changed : ndarray of shape (H, W), bool
+        Where it differs from what came.
+    ratio : float
+        Of the verdict.
+    report : dict
+        Plain data.
+    """
+
+    planes: Planes
+    changed: NDArray[np.bool_]
+    ratio: float
+    report: dict[str, Any]
+
+
+class Chain:
+    """One pass."""
+
+    def __init__(
+        self,
+        source: Source,
+        guide: Callable[[int], NDArray[Any]],
+        settings: Settings,
+    ) -> None:
+        self._memo = Memo()
+        self._source = source
+        self._settings = settings
+        self.motion = ClipMotion(
+            guide,
+            source.count,
+            colour=source.frame(0).shape[-1] > 1,
+            method=settings.flow_method,
+            options=settings.flow_options,
+            memo=self._memo,
+        )
+        self._exposure = ClipExposure(
+            source,
+            self.motion,
+            self._memo,
+            given=settings.exposure,
+            noise=settings.noise,
+            seed=settings.seed,
+        )
+
+    def forget_before(self, index: int) -> None:
+        """Drop what no frame from ``index`` on needs."""
+        self._memo.forget_before(index - KEPT_BEHIND)
+
+    def restored(self, index: int) -> Restored:
+        """Return a restored frame."""
+        return self._memo.get("restored", index, lambda: self._restore(index))
+
+    def unsteadiness(self, index: int) -> float:
+        """Return median acceleration over median velocity where the frame moves."""
+        motion = self.motion.motion(index)
+        moving = self._twins(index).moving
+        if not moving.any():
+            return 0.0
+        medians = [
+            float(np.median(np.linalg.norm(field[moving], axis=-1)))
+            for field in (motion.acceleration, motion.velocity)
+        ]
+        return medians[0] / max(medians[1], 1e-6)
+
+    def _look(self, index: int, planes: Planes) -> Look:
+        motion = self.motion.motion(index)
+        exposure = self._exposure.exposure(index).value
+        visible = _unsmear.visibility(motion.velocity, exposure)
+        return look(planes, motion.velocity, motion.acceleration, exposure, visible)
+
+    def _walk(self, index: int) -> tuple[list[Planes], int]:
+        """Return the frame's luma restored with every strength, padded."""
+        return self._memo.get("walk", index, lambda: self._start_walk(index))
+
+    def _start_walk(self, index: int) -> tuple[list[Planes], int]:
+        luma = self._source.luma(index)[np.newaxis]
+        noise = self._exposure.exposure(index).noise
+        return walk([self._look(index, luma)], WALK, noise)
+
+    def _twin(self, index: int) -> Plane:
+        pictures, pad = self._walk(index)
+        return cropped(pictures[TWIN], pad)[0]
+
+    def _twins(self, index: int) -> Twins:
+        return self._memo.get("twins", index, lambda: self._find_twins(index))
+
+    def _find_twins(self, index: int) -> Twins:
+        motion = self.motion.motion(index)
+        neighbours = []
+        for other, way in ((index - 1, motion.backward), (index + 1, motion.forward)):
+            back = self.motion.flow(other, index)
+            if way is not None and back is not None:
+                neighbours.append((self._twin(other), way, back))
+        exposure = self._exposure.exposure(index).value
+        return twins(neighbours, motion.velocity, exposure)
+
+    def _scores(self, index: int) -> list[float]:
+        pictures, pad = self._walk(index)
+        against = self._twins(index)
+        return [score(cropped(picture, pad)[0], against) for picture in pictures]
+
+    def _own_strength(self, index: int) -> float:
+        noise = self._exposure.exposure(index).noise
+
+        def choose() -> float:
+            return choose_strength(WALK, self._scores(index), noise)
+
+        return self._memo.get("strength", index, choose)
+
+    def _strength(self, index: int) -> float:
+        """Return the strength for a frame: those of it and its neighbours, 2 to 1."""
+        near = [j for j in (index - 1, index + 1) if 0 <= j < self._source.count]
+        logs = [2 * np.log(self._own_strength(index))]
+        logs += [np.log(self._own_strength(j)) for j in near]
+        return float(np.exp(sum(logs) / (len(near) + 2)))
+
+    def _restore(self, index: int) -> Restored:
+        exposure = self._exposure.exposure(index)
+        motion = self.motion.motion(index)
+        planes = self._source.planes(index)
+        blur = exposure.value * np.linalg.norm(motion.velocity, axis=-1)
+        report: dict[str, Any] = {
+            "index": index,
+            "exposure": exposure.value,
+            "exposure_status": exposure.status,
+            "exposure_found": {
+                name: None if isinstance(item, float) and np.isnan(item) else item
+                for name, item in exposure.found.items()
+                if name != "noise"
+            },
+            "noise": exposure.noise / self._source.scale,
+            "blur_px": float(np.nanpercentile(blur, 95)) if blur.size else 0.0,
+        }
+        if not (np.nan_to_num(blur) > 0).any() or not self._twins(index).moving.any():
+            nothing = np.zeros(blur.shape, bool)
+            report["verdict"] = "left as is: nothing moves enough to be blurred"
+            return Restored(planes, nothing, float("nan"), report)
+        strength = self._strength(index)
+        single, pad = self._single(index, strength)
+        luma = self._source.luma
+        verdict = judge(
+            luma(index),
+            self._source.luma_of(cropped(single, pad)),
+            self._twins(index),
+            blur,
+            exposure.status,
+        )
+        report |= {"regularization": strength / self._source.scale} | verdict.report
+        if self._settings.joint > 1 and (verdict.share > 0).any():
+            single, pad, weight = self._joint(index, single, pad, strength)
+            report["neighbours_weight"] = weight
+        return self._composed(planes, cropped(single, pad), verdict, report)
+
+    def _single(self, index: int, strength: float) -> tuple[Planes, int]:
+        """Return the frame restored by itself, padded."""
+        noise = self._exposure.exposure(index).noise
+        planes = self._source.planes(index)
+        pictures, pad = self._walk(index)
+        if len(planes) > 1:
+            way = (strength,) if strength <= WALK[TWIN] else (WALK[TWIN], strength)
+            pictures, pad = walk([self._look(index, planes)], way, noise, pad=pad)
+            return pictures[-1], pad
+        below = max((k for k, one in enumerate(WALK) if one <= strength), default=0)
+        start = pictures[below]
+        looks = [self._look(index, planes)]
+        pictures, _ = walk(
+            looks, (strength,), noise, pad=pad, first=(3, 12), start=start
+        )
+        return pictures[-1], pad
+
+    def _joint(
+        self, index: int, picture: Planes, pad: int, strength: float
+    ) -> tuple[Planes, int, float]:
+        reach = self._settings.joint // 2
+        neighbours = []
+        for other in range(index - reach, index + reach + 1):
+            way, back = self._way(index, other), self._way(other, index)
+            if other != index and way is not None and back is not None:
+                exposure = self._exposure.exposure(other).value
+                motion = self.motion.motion(other)
+                planes = self._source.planes(other)
+                neighbours.append(Neighbour(planes, motion, exposure, back, way))
+        own = self._look(index, self._source.planes(index))
+        return restore_jointly(
+            own,
+            neighbours,
+            picture,
+            pad,
+            strength=strength,
+            noise=self._exposure.exposure(index).noise,
+            method=self._settings.flow_method,
+        )
+
+    def _way(self, start: int, end: int) -> Planes | None:
+        """Return the flow between two frames next to each other."""
+        if abs(start - end) != 1:
+            return None
+        return self.motion.flow(start, end)
+
+    @staticmethod
+    def _composed(
+        planes: Planes, restored: Planes, verdict: Verdict, report: dict[str, Any]
+    ) -> Restored:
+        changed = (verdict.share > 0) & np.isfinite(planes).all(axis=0)
+        mixed = planes + verdict.share * (restored - planes)
+        return Restored(
+            np.where(changed, mixed, planes), changed, verdict.ratio, report
+        )

@@ -1,0 +1,124 @@
+"""Exposure of every frame: searched over three frames, smoothed over five.
+
+Of the estimates s_j around a frame those that can be relied on count, by how near and
+how sharp they are,
+
+    log s = sum w_j log s_j / sum w_j,   w_j = (1 - |j - i| / 3) / (spread_j^2 + .02^2),
+
+so that a shutter that stays as it is gives an exposure that stays as it is. Where less
+than half of them can be relied on, the frame's own cautious value is used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unsmear import _unsmear
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from unsmear.restoration.clip_motion import ClipMotion
+    from unsmear.restoration.memo import Memo
+    from unsmear.restoration.source import Source
+
+__all__ = ["ClipExposure", "Exposure"]
+
+LIMITS = (0.35, 1.25)
+POOLED = 1
+SMOOTHED = 2
+LEAST_SPREAD = 0.02
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Exposure of a frame.
+
+    Attributes
+    ----------
+    value : float
+        Share of the frame interval.
+    status : {"given", "ok", "unsure", "small"}
+    noise : float
+        Standard deviation of the noise, grey levels.
+    found : dict
+        What the search over the frame and its neighbours said.
+    """
+
+    value: float
+    status: str
+    noise: float
+    found: dict[str, Any]
+
+
+class ClipExposure:
+    """Exposures of a clip, each found when it is first asked for."""
+
+    def __init__(
+        self,
+        source: Source,
+        motion: ClipMotion,
+        memo: Memo,
+        *,
+        given: float | None,
+        noise: float | None,
+        seed: int,
+    ) -> None:
+        self._source = source
+        self._motion = motion
+        self._memo = memo
+        self._given = given
+        self._noise = noise
+        self._seed = seed
+
+    def exposure(self, index: int) -> Exposure:
+        """Return the exposure of a frame."""
+        return self._memo.get("exposure", index, lambda: self._smoothed(index))
+
+    def _found(self, index: int) -> dict[str, Any]:
+        return self._memo.get("found", index, lambda: self._search(index))
+
+    def _search(self, index: int) -> dict[str, Any]:
+        frames = self._around(index, POOLED)
+        motions = [self._motion.motion(j) for j in frames]
+        return dict(
+            _unsmear.estimate_exposure(
+                np.stack([self._source.luma(j) for j in frames]),
+                _stack([motion.velocity for motion in motions]),
+                _stack([motion.acceleration for motion in motions]),
+                LIMITS,
+                self._noise,
+                self._seed + index,
+                of_content=True,
+            )
+        )
+
+    def _around(self, index: int, reach: int) -> range:
+        return range(max(0, index - reach), min(self._source.count, index + reach + 1))
+
+    def _smoothed(self, index: int) -> Exposure:
+        own = self._found(index)
+        if self._given is not None:
+            return Exposure(self._given, "given", own["noise"], own)
+        near = self._around(index, SMOOTHED)
+        trusted = [j for j in near if self._found(j)["status"] == "ok"]
+        if 2 * len(trusted) < len(near):
+            value, status = own["value"], own["status"]
+            if status == "ok":
+                value, status = min(value, 1.0), "unsure"
+            return Exposure(float(value), status, own["noise"], own)
+        weights = [
+            (1 - abs(j - index) / (SMOOTHED + 1))
+            / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
+            for j in trusted
+        ]
+        logs = [np.log(self._found(j)["value"]) for j in trusted]
+        value = float(np.exp(np.average(logs, weights=weights)))
+        return Exposure(value, "ok", own["noise"], own)
+
+
+def _stack(fields: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(np.stack(fields), np.float32)

@@ -1,0 +1,159 @@
+"""What of a restoration to use, where, and why, in words.
+
+Every connected region that moves is judged by itself, so that a small mover on a still
+scene is not voted down by it: with e the squared errors against the restored
+neighbours (`twin_frames`),
+
+    ratio = sqrt(mean e(restored) / mean e(blurred)),
+
+used up to a limit that depends on the trust in the exposure, to which the ratio is
+blind. Within a region used, places where the restoration is clearly worse than the
+blurred frame are left out softly,
+
+    local(p) = sqrt((G e_x + k E_x) / (G e_b + k E_b)),
+
+G a Gaussian of 12 px, E the region's means. What blurs by less than 1/2 px is returned
+as it came, bit for bit, fading in up to 1 px.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unsmear import _unsmear
+from unsmear.restoration.sampling import smoothed
+from unsmear.restoration.twin_frames import errors
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from unsmear.restoration.twin_frames import Twins
+
+    Plane = NDArray[np.float32]
+
+__all__ = ["Verdict", "judge"]
+
+LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.06, "unsure": 0.98}
+LOCAL_SMOOTHING = 12.0
+REGION_SHARE = 0.5
+LOCAL_LIMIT = (1.15, 1.3)
+STILL, FULL = 0.5, 1.0
+SMALLEST_REGION = 64
+LOW_RISK, HIGH_RISK = 0.85, 1.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What to use.
+
+    Attributes
+    ----------
+    share : ndarray of shape (H, W), float32
+        Of the restoration in the result; 0 = as it came.
+    ratio : float
+        Over all regions; NaN where nothing could be compared.
+    report : dict
+        In numbers and words.
+    """
+
+    share: Plane
+    ratio: float
+    report: dict[str, Any]
+
+
+def judge(
+    blurred: Plane, restored: Plane, against: Twins, blur: Plane, status: str
+) -> Verdict:
+    """Judge a restoration; ``blur`` is the length of blur (px) of every pixel."""
+    fade = np.clip((np.nan_to_num(blur) - STILL) / (FULL - STILL), 0.0, 1.0)
+    own, input_ = errors(restored, against), errors(blurred, against)
+    known = np.isfinite(own) & np.isfinite(input_)
+    labels, count = _unsmear.regions(against.moving)
+    share = np.zeros(blurred.shape)
+    limit = LIMITS[status]
+    found: list[dict[str, Any]] = []
+    for number in range(1, count + 1):
+        region = labels == number
+        pixels = int(region.sum())
+        if pixels < SMALLEST_REGION:
+            continue
+        compared = region & known
+        ratio = _ratio(own, input_, compared)
+        # Without a neighbour to compare with, only a trusted exposure speaks for it.
+        used = ratio <= limit if np.isfinite(ratio) else status in ("given", "ok")
+        found.append({"pixels": pixels, "ratio": _plain(ratio), "used": bool(used)})
+        if used:
+            share[region] = _locally(own, input_, compared)[region]
+    share *= fade
+    ratio = _ratio(own, input_, known)
+    report = {
+        "ratio": _plain(ratio),
+        "limit": limit,
+        "regions": sorted(found, key=lambda one: -one["pixels"]),
+        "used_share": float((share > 0).mean()),
+        **_words(ratio, found, status, limit),
+    }
+    return Verdict(share.astype(np.float32), ratio, report)
+
+
+def _ratio(
+    own: NDArray[np.float64], input_: NDArray[np.float64], where: NDArray[np.bool_]
+) -> float:
+    if not where.any():
+        return float("nan")
+    return float(np.sqrt(own[where].mean() / max(input_[where].mean(), 1e-9)))
+
+
+def _locally(
+    own: NDArray[np.float64], input_: NDArray[np.float64], where: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return how far to use the restoration in a region that is used."""
+    if not where.any():
+        return np.ones(own.shape)
+    weight = smoothed(where.astype(np.float64), LOCAL_SMOOTHING) + REGION_SHARE
+    parts = [
+        smoothed(np.where(where, error, 0.0), LOCAL_SMOOTHING)
+        + REGION_SHARE * error[where].mean()
+        for error in (own, input_)
+    ]
+    local = np.sqrt(parts[0] / np.maximum(parts[1], 1e-9 * weight))
+    low, high = LOCAL_LIMIT
+    return np.asarray(np.clip((high - local) / (high - low), 0.0, 1.0))
+
+
+def _words(
+    ratio: float, found: list[dict[str, Any]], status: str, limit: float
+) -> dict[str, Any]:
+    """Say what was found, what to expect and what was done."""
+    used = [one for one in found if one["used"]]
+    if not found:
+        text = "left as is: nothing moves enough to be blurred"
+    elif not used:
+        text = (
+            f"left as is: restored frames disagree (ratio {ratio:.2f}, at most {limit})"
+        )
+        if status == "unsure":
+            text += " and the exposure could not be found with certainty"
+    elif len(used) < len(found):
+        text = (
+            f"restored {len(used)} of {len(found)} moving regions, the rest as it was"
+        )
+    else:
+        text = "restored"
+    gain = None
+    if used and np.isfinite(ratio):
+        # Both restorations err by s, independently: e_x = 2 s^2, e_b = b^2 + s^2.
+        gain = round(float(10 * np.log10(max(2 / ratio**2 - 1, 0.1))), 1)
+    risk = "none" if not used else "low"
+    if used and (not np.isfinite(ratio) or ratio > HIGH_RISK):
+        risk = "high"
+    elif used and (ratio > LOW_RISK or status in ("unsure", "small")):
+        risk = "medium"
+    return {"verdict": text, "expected_gain_db": gain, "ringing_risk": risk}
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
