@@ -38,7 +38,13 @@ def test_demo_writes_and_measures(tmp_path: Path, capsys) -> None:
     assert printed["flow endpoint error (px)"] < 0.6
     assert printed["seconds"] < 60
     names = {path.name for path in (tmp_path / "demo").iterdir()}
-    assert names == {"deblurred", "flow.png", "side_by_side.png", "report.json"}
+    assert names == {
+        "deblurred",
+        "flow.png",
+        "side_by_side.png",
+        "report.json",
+        "report.html",
+    }
     assert unsmear.read_frames(tmp_path / "demo" / "deblurred").shape == (
         5,
         216,

@@ -11,14 +11,14 @@ import numpy as np
 
 from unsmear import metrics, plot
 from unsmear._atomic import write_bytes_atomic
+from unsmear._plain_data import plain_data
 from unsmear._progress import ProgressBar
 from unsmear.cli import _common
-from unsmear.deblur import deblur
 from unsmear.demo_clip import DemoClip, demo_clip
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.images import write_image
+from unsmear.sequence import SequenceResult, deblur_sequence
 from unsmear.sequences import write_frames
-from unsmear.velocity import velocity_of_frame
 
 if TYPE_CHECKING:
     import argparse
@@ -28,15 +28,7 @@ if TYPE_CHECKING:
 SUMMARY = "the whole job on a bundled clip: flow, deblurred frames, errors"
 EXAMPLE = "unsmear demo -o unsmear_demo"
 
-
-# What deblurs: a velocity that is soft at motion boundaries, across which no single
-# path explains the blur, rings less there than the exact one. The clip moves up to
-# 5.3 px/frame, within half a wavelength of this frequency.
-_VELOCITY: dict[str, Any] = {
-    "method": "least-squares",
-    "tuning_frequency": 0.09,
-    "neighbourhood": 3.0,
-}
+_WRITTEN = ("deblurred", "flow.png", "side_by_side.png", "report.json", "report.html")
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
@@ -55,7 +47,8 @@ def run(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     clip = demo_clip()
     with ProgressBar("demo") as bar:
-        restored = _restore(clip, bar)
+        whole = deblur_sequence(clip.blurred, channel_axis=3, progress=bar)
+    restored = whole.frames
     middle = len(clip.blurred) // 2
     flow = optical_flow(clip.blurred, index=middle, channel_axis=3)
     folder = Path(options.output)
@@ -82,26 +75,41 @@ def run(options: argparse.Namespace) -> None:
     )
     result = _errors(clip, flow, restored, middle)
     result["seconds"] = time.perf_counter() - started
-    report = {**result, "flow": flow.report}
+    report = plain_data({**result, "flow": flow.report, "frames": whole.reports})
     text = json.dumps(report, indent=2, allow_nan=False)
     write_bytes_atomic(folder / "report.json", text.encode())
-    result["written"] = [
-        str(folder / name)
-        for name in ("deblurred", "flow.png", "side_by_side.png", "report.json")
-    ]
+    _write_page(folder / "report.html", clip, flow, whole, report)
+    result["written"] = [str(folder / name) for name in _WRITTEN]
     _common.show_result(result, as_json=options.json)
 
 
-def _restore(clip: DemoClip, bar: ProgressBar) -> NDArray[Any]:
-    restored = []
-    for index, frame in enumerate(clip.blurred):
-        velocity, _ = velocity_of_frame(
-            clip.blurred, index, channel_axis=3, **_VELOCITY
-        )
-        result = deblur(frame, velocity, exposure=clip.exposure, channel_axis=2)
-        restored.append(result.image)
-        bar((index + 1) / len(clip.blurred))
-    return np.stack(restored)
+def _write_page(
+    path: Path,
+    clip: DemoClip,
+    flow: FlowResult,
+    whole: SequenceResult,
+    report: dict[str, Any],
+) -> None:
+    count = len(clip.blurred)
+    middle = count // 2
+    of_middle: list[Any] = [None] * count
+    flows, confidences, truths = list(of_middle), list(of_middle), list(of_middle)
+    flows[middle], confidences[middle] = flow.flow, flow.confidence
+    truths[middle] = clip.flow[middle]
+    plot.report(
+        path,
+        clip.blurred,
+        restored=whole.frames,
+        flows=flows,
+        confidences=confidences,
+        sharp=clip.sharp,
+        true_flows=truths,
+        exposure=clip.exposure,
+        verdicts=sorted({str(frame["verdict"]) for frame in whole.reports}),
+        parameters=report,
+        command=EXAMPLE,
+        title="unsmear demo",
+    )
 
 
 def _errors(
