@@ -211,7 +211,8 @@ def markdown(report: dict[str, Any]) -> str:
             own = [r for r in records if (r["case"], r["noise"]) == (case, noise)]
             lines.append(row(case, own, methods))
         own = [r for r in records if r["case"] in IN_THE_MEAN and r["noise"] == noise]
-        lines.append(row("mean of " + " ".join(IN_THE_MEAN), own, methods))
+        counted = [case for case in cases if case in IN_THE_MEAN]
+        lines.append(row("mean of " + " ".join(counted), own, methods))
         all_cases = [r for r in records if r["noise"] == noise]
         worst = [
             f"{min(r['gain'] for r in all_cases if r['method'] == m):+.1f}"
