@@ -3,7 +3,8 @@
 //! *Evidence* is the trace of the data term, the largest over the levels of its average over
 //! [`REACH`] px of the level: below [`LEAST_EVIDENCE`] no filter that looked here saw anything and
 //! the flow is only what its surroundings suggest. It is about 1 on texture, 1e-2 where the picture
-//! is smooth, and 0 where it is flat. Precision (see [`super::precision`]) does not add to it.
+//! is smooth, and 0 where it is flat. Pull to rest and precision (see [`super::still`],
+//! [`super::precision`]) do not add to it: both reach out from patterns nearby.
 
 use ndarray::{Array2, Zip};
 
@@ -12,7 +13,7 @@ use crate::error::Result;
 use crate::pyramid::{Resampling, resample, smooth};
 
 /// Deviation of the average of the evidence, px of the level.
-pub(super) const REACH: f64 = 2.0;
+pub(super) const REACH: f64 = 1.5;
 /// Trace of the data term below which the flow is unknown.
 pub(super) const LEAST_EVIDENCE: f32 = 1e-3;
 

@@ -47,7 +47,7 @@ pub(super) struct Refined {
     pub(super) flow: FlowField<f32>,
     /// The data terms, raised by precision.
     pub(super) equations: NormalEquations,
-    /// Their trace before it was raised.
+    /// Their trace before it was raised, without the pull to rest.
     pub(super) trace: Array2<f32>,
     /// Mean change of the flow by each warp, px of the level.
     pub(super) changes: Vec<f64>,
@@ -77,10 +77,10 @@ impl Level<'_> {
             changes.push(self.minimise(&mut flow, sights, &mut work, control)?);
             control.advance()?;
         }
-        let Work { equations, gain, .. } = work;
+        let Work { equations, springs, gain, .. } = work;
         let trace = Array2::from_shape_fn((self.height, self.width), |(y, x)| {
             let i = y * self.width + x;
-            (equations.a11[i] + equations.a22[i]) / gain[i]
+            (equations.a11[i] + equations.a22[i]) / gain[i] - 2.0 * springs[i]
         });
         Ok(Refined { flow: self.sharpen(flow, control)?, equations, trace, changes })
     }
