@@ -23,8 +23,8 @@ test-python: $(VENV)/developed
 lint: $(VENV)/developed
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
-	$(BIN)/ruff format --check python tests benches scripts
-	$(BIN)/ruff check python tests benches scripts
+	$(BIN)/ruff format --check python tests benches scripts examples
+	$(BIN)/ruff check python tests benches scripts examples
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest unsmear._unsmear
 

@@ -22,6 +22,8 @@ const WIDTH: usize = 640;
 const PIXELS: usize = HEIGHT * WIDTH;
 /// f32 samples of each of the three arrays of the triad: 192 MB, beyond any cache.
 const TRIAD: usize = 1 << 24;
+/// Rounds of arithmetic per measurement.
+const ROUNDS: usize = 1 << 14;
 /// Independent sums of the arithmetic peak: enough to hide the latency of an addition.
 const SUMS: usize = 128;
 
@@ -152,7 +154,6 @@ fn machine(criterion: &mut Criterion) {
             black_box(&mut a);
         });
     });
-    const ROUNDS: usize = 1 << 14;
     group.throughput(Throughput::Elements((2 * SUMS * ROUNDS) as u64));
     group.bench_function("multiply and add, base instructions", |bencher| {
         bencher.iter(|| {

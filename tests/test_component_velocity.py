@@ -128,6 +128,37 @@ def test_what_the_face_says_of_shapes_and_orientations() -> None:
     np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-12)
 
 
+def test_several_scales_follow_one_another() -> None:
+    frames = moving_texture((0.3, -0.2), (3, 24, 26))
+    shares: list[float] = []
+    both = unsmear.component_velocities(
+        frames, tuning_frequency=(0.2, 0.1), orientations=4, progress=shares.append
+    )
+    np.testing.assert_allclose(both.frequency, [0.2] * 4 + [0.1] * 4, rtol=1e-12)
+    for place, f0 in ((slice(0, 4), 0.2), (slice(4, 8), 0.1)):
+        alone = unsmear.component_velocities(
+            frames, tuning_frequency=f0, orientations=4
+        )
+        for name, part in vars(alone).items():
+            np.testing.assert_array_equal(vars(both)[name][place], part)
+    assert shares == sorted(shares) and all(0 <= share <= 1 for share in shares)
+
+
+def test_amplitudes_that_beat_are_sorted_out() -> None:
+    # Two waves in one filter, drifting apart: |1 + exp(1.6 i t)|.
+    t, y, x = np.ogrid[-1:2, :40, :40]
+    frames = np.cos(0.9 * x + 0 * y) + np.cos(0.9 * x + 1.6 * t)
+    near, far = (np.abs(1 + np.exp(1.6j * s)) for s in (0, 1))
+    steadiness = 2 * near * far / (near**2 + far**2)
+    middle = (0, slice(15, 25), slice(15, 25))
+    # q = 0.938; the negative frequency adds 1e-3 of the response at the most.
+    for least, kept in ((steadiness - 5e-3, True), (steadiness + 5e-3, False)):
+        c = unsmear.component_velocities(
+            frames, tuning_frequency=0.9 / (2 * np.pi), least_steadiness=float(least)
+        )
+        assert (np.isfinite(c.velocity[middle]) == kept).all()
+
+
 @pytest.mark.parametrize(
     ("frames", "given", "message"),
     [
@@ -144,6 +175,13 @@ def test_what_the_face_says_of_shapes_and_orientations() -> None:
             r"amplitude_fraction must be in \[0",
         ),
         ((3, 8, 8), {"sigma": 2.0}, "component_velocities has no parameter 'sigma'"),
+        ((3, 8, 8), {"tuning_frequency": ()}, "at least one frequency, got none"),
+        (
+            (3, 8, 8),
+            {"tuning_frequency": (0.1, 0.7)},
+            "tuning_frequency must be .*, got 0.7",
+        ),
+        ((3, 8, 8), {"least_steadiness": 1.5}, r"least_steadiness must be in \[0, 1\]"),
     ],
 )
 def test_bad_calls_are_named(
@@ -171,13 +209,14 @@ def expected_components(
         )
         tested = centres
     else:
-        gradients, amplitudes = [], []
+        gradients, amplitudes, steady = [], [], []
         for k in centres:
             phi = np.empty((*frames.shape[1:], 3))
             if temporal == "steps":
                 responses = gabor.respond(frames, k, sigma, support, border)
                 response = responses[index]
                 phi[..., 2] = phase_gradient.mean_phase_step(responses, index)
+                steady.append(twin.steadiness(responses, index))
             else:
                 in_time = gabor.respond_in_time(frames, index, 0.0, sigma, support)
                 response, slope = (
@@ -197,6 +236,8 @@ def expected_components(
         ]
     )
     valid = (amplitude >= least) & (deviation <= given["tau"])
+    if temporal == "steps":
+        valid &= np.array(steady) >= given["least_steadiness"]
     velocity = twin.component_velocity(gradient, valid)
     return gradient, velocity, amplitude, centres[:, :2]
 
@@ -209,6 +250,7 @@ def expected_components(
         ((4, 11, 13), 1, {"border": "reflect", "amplitude_fraction": 0.2}),
         ((5, 17, 2), 3, {"border": "zero", "tau": 2.0}),
         ((3, 2, 9), 1, {"support": 2.0, "bandwidth_octaves": 1.5}),
+        ((4, 13, 12), 2, {"least_steadiness": 0.99}),
     ],
 )
 @pytest.mark.parametrize("temporal", TEMPORAL)

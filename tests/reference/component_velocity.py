@@ -9,10 +9,15 @@ the only part of the motion that one filter can see. It is believed where
     amplitude            |R| >= max(fraction * largest |R| of the bank, floor),
     frequency            |(phi_x, phi_y, phi_t) - (k_x, k_y, omega)| <= tau sigma_k,
 
-sigma_k = 1/sigma rad/px. The second test removes the neighbourhoods of phase
-singularities, where phase turns fast while the amplitude is not yet zero. For filters
-without a temporal carrier it runs over (phi_x, phi_y) only. The floor keeps rounding
-from passing as signal in a blank picture: it is a share of the largest |brightness|.
+sigma_k = 1/sigma rad/px. Steps between frames may also ask for steadiness,
+
+    2 a_0 a_1/(a_0^2 + a_1^2) >= least        for each neighbouring frame,
+
+which two motions in one filter, beating, do not have. The second test removes the
+neighbourhoods of phase singularities, where phase turns fast while the amplitude is not
+yet zero. For filters without a temporal carrier it runs over (phi_x, phi_y) only. The
+floor keeps rounding from passing as signal in a blank picture: it is a share of the
+largest |brightness|.
 
 NaN where a test fails or grad phi = 0; a still picture gives exactly 0.
 
@@ -43,6 +48,18 @@ def frequency_deviation(gradient: Real, wavevector: Real, sigma: float) -> Real:
     """|gradient - k| / sigma_k over as many components as ``wavevector`` has."""
     difference = gradient[..., : len(wavevector)] - wavevector
     return np.asarray(sigma * np.sqrt((difference**2).sum(-1)))
+
+
+def steadiness(responses: NDArray[np.complex128], index: int) -> Real:
+    """Least 2 a0 a1 / (a0^2 + a1^2) of frame ``index`` with its neighbours; (H, W)."""
+    here = np.abs(responses[index])
+    ratios = []
+    for t in (index - 1, index + 1):
+        if 0 <= t < len(responses):
+            there = np.abs(responses[t])
+            with np.errstate(invalid="ignore"):
+                ratios.append(2 * here * there / (here**2 + there**2))
+    return np.nan_to_num(np.minimum.reduce(ratios), nan=1.0)
 
 
 def component_velocity(gradient: Real, valid: NDArray[np.bool_]) -> Real:

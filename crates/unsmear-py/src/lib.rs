@@ -3,6 +3,7 @@
 
 use pyo3::prelude::*;
 
+mod allocator;
 mod arrays;
 mod coarse_to_fine;
 mod component_velocity;
@@ -19,11 +20,6 @@ mod psf;
 mod restoration;
 mod thesis;
 mod threads;
-
-/// The system's allocator gives large blocks back and fetches them anew, page fault by page fault,
-/// at every call: up to half of the time of a call that fills tens of megabytes.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// Private core of `unsmear`; import the package instead.
 #[pymodule]
@@ -61,6 +57,7 @@ mod _unsmear {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::allocator::keep_freed_memory();
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("optimized", !cfg!(debug_assertions))
     }

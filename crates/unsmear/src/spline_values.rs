@@ -56,6 +56,7 @@ pub(crate) fn evaluate<T: Real, const N: usize>(
 /// Samples 16 positions whose windows lie side by side; false, and nothing done, where they do not or leave the
 /// picture.
 #[inline(always)]
+#[allow(clippy::needless_bitwise_bool, reason = "without branches the loop becomes vectors")]
 fn side_by_side<T: Real, const N: usize>(
     c: &[T],
     [height, width]: [usize; 2],

@@ -71,6 +71,7 @@ fn keep(picture: &[f32], u: &[f32], v: &[f32], warped: &mut [f32]) {
 
 /// 1 where a pixel of row `y` ends inside, else 0, NaN too.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[allow(clippy::needless_bitwise_bool, reason = "without branches the loop becomes vectors")]
 fn inside(y: f32, [right, bottom]: [f32; 2], u: &[f32], v: &[f32], out: &mut [f32]) {
     let n = out.len();
     let (u, v) = (&u[..n], &v[..n]);
