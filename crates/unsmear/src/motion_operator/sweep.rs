@@ -11,7 +11,7 @@ use multiversion::multiversion;
 
 use super::expand::{Expanded, expand};
 use super::lanes::{LANES, Lanes};
-use super::plan::{Kind, RowPlan};
+use super::plan::{Kind, Record, RowPlan};
 
 /// Records scattered together: a write that a later read overlaps has by then left the processor's queue
 /// of writes, and the weights (5 kB each for 15 px) stay in the first-level cache.
@@ -30,39 +30,11 @@ pub(super) fn gather_row<const CUBIC: bool>(
     out: &mut [f32],
     scratch: &mut Scratch,
 ) {
-    let rows = &mut scratch[0];
     out.fill(0.0);
     for record in &plan.records {
-        let column = record.column as usize;
-        let n = LANES.min(out.len() - column);
-        let place = start + column;
-        let own = &mut out[column..column + n];
-        if record.kind == Kind::Still {
-            let meant = &plan.lanes[record.lanes as usize];
-            for ((own, &x), meant) in own.iter_mut().zip(&x[place..place + n]).zip(meant.0) {
-                *own = if meant > 0.0 { x } else { *own };
-            }
-            continue;
-        }
-        expand::<CUBIC>(plan, record, stride as i32, rows);
-        let mut sum = Lanes::ZERO;
-        let (weights, deltas) = (&rows.weights[..rows.count], &rows.deltas[..rows.count]);
-        for (weight, &delta) in weights.iter().zip(deltas) {
-            let there = &x[place.wrapping_add_signed(delta as isize)..][..LANES];
-            if record.kind == Kind::Straight {
-                let back = &x[place.wrapping_add_signed(-delta as isize)..][..LANES];
-                for i in 0..LANES {
-                    sum.0[i] += weight.0[i] * (there[i] + back[i]);
-                }
-            } else {
-                for i in 0..LANES {
-                    sum.0[i] += weight.0[i] * there[i];
-                }
-            }
-        }
-        for (own, sum) in own.iter_mut().zip(sum.0) {
-            *own += sum;
-        }
+        expand::<CUBIC>(plan, record, stride as i32, &mut scratch[0]);
+        let sum = gather(record, &scratch[0], x, start);
+        take_own(plan, record, &sum, out);
     }
 }
 
@@ -78,30 +50,140 @@ pub(super) fn scatter_row<const CUBIC: bool>(
 ) {
     for records in plan.records.chunks(TOGETHER) {
         let mut data = [Lanes::ZERO; TOGETHER];
-        let mut most = 0;
         for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
             expand::<CUBIC>(plan, record, stride as i32, rows);
-            most = most.max(rows.count);
-            let own = &r[record.column as usize..];
-            let n = LANES.min(own.len());
-            data.0[..n].copy_from_slice(&own[..n]);
+            *data = lanes_at(r, record);
         }
-        for k in 0..most {
-            for ((record, rows), data) in records.iter().zip(scratch.iter()).zip(&data) {
-                if k >= rows.count {
-                    continue;
-                }
-                let (weight, delta) = (&rows.weights[k], rows.deltas[k] as isize);
-                let place = start + record.column as usize;
-                let there = &mut x[place.wrapping_add_signed(delta)..][..LANES];
+        scatter(records, scratch, &data, x, start);
+    }
+}
+
+/// Writes a row of b = A x and adds A^T (weights b) of it to `out`, in which the row's first pixel is at `place`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(super) fn normal_row<const CUBIC: bool>(
+    plan: &RowPlan,
+    x: &[f32],
+    weights: &[f32],
+    stride: usize,
+    start: usize,
+    b: &mut [f32],
+    out: &mut [f32],
+    place: usize,
+    scratch: &mut Scratch,
+) {
+    b.fill(0.0);
+    for records in plan.records.chunks(TOGETHER) {
+        let mut data = [Lanes::ZERO; TOGETHER];
+        for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
+            expand::<CUBIC>(plan, record, stride as i32, rows);
+            let sum = gather(record, rows, x, start);
+            take_own(plan, record, &sum, b);
+            let weights = lanes_at(weights, record);
+            for i in 0..LANES {
+                data.0[i] = weights.0[i] * sum.0[i];
+            }
+        }
+        scatter(records, scratch, &data, out, place);
+    }
+}
+
+/// The samples of a row at a record's pixels; 0 beyond its end.
+#[inline(always)]
+fn lanes_at(row: &[f32], record: &Record) -> Lanes {
+    let own = &row[record.column as usize..];
+    if let Some(own) = own.first_chunk() {
+        return Lanes(*own);
+    }
+    let mut lanes = Lanes::ZERO;
+    lanes.0[..own.len()].copy_from_slice(own);
+    lanes
+}
+
+/// Puts the sums of a record's own pixels into their row.
+#[inline(always)]
+fn take_own(plan: &RowPlan, record: &Record, sum: &Lanes, row: &mut [f32]) {
+    let gain = &plan.lanes[record.lanes as usize].0;
+    let own = row[record.column as usize..].iter_mut();
+    for ((own, &sum), &gain) in own.zip(&sum.0).zip(gain) {
+        *own = if gain > 0.0 { sum } else { *own };
+    }
+}
+
+/// The sums of a record's pixels.
+#[inline(always)]
+fn gather(record: &Record, rows: &Expanded, x: &[f32], start: usize) -> Lanes {
+    let place = start + record.column as usize;
+    if record.kind == Kind::Still {
+        return lanes_at(&x[start..], record);
+    }
+    // Four sums, so that additions need not wait for each other.
+    let mut sums = [Lanes::ZERO; 4];
+    let (weights, deltas) = (&rows.weights[..rows.count], &rows.deltas[..rows.count]);
+    let (fours, rest) = (weights.chunks_exact(4), weights.chunks_exact(4).remainder());
+    let done = rows.count - rest.len();
+    for (weights, deltas) in fours.zip(deltas.chunks_exact(4)) {
+        for k in 0..4 {
+            add_product(&mut sums[k], record, &weights[k], x, place, deltas[k]);
+        }
+    }
+    for (weight, &delta) in rest.iter().zip(&deltas[done..]) {
+        add_product(&mut sums[0], record, weight, x, place, delta);
+    }
+    let mut sum = Lanes::ZERO;
+    for i in 0..LANES {
+        sum.0[i] = (sums[0].0[i] + sums[1].0[i]) + (sums[2].0[i] + sums[3].0[i]);
+    }
+    sum
+}
+
+/// `sum` += `weight` x.
+#[inline(always)]
+fn add_product(
+    sum: &mut Lanes,
+    record: &Record,
+    weight: &Lanes,
+    x: &[f32],
+    place: usize,
+    delta: i32,
+) {
+    let there = &x[place.wrapping_add_signed(delta as isize)..][..LANES];
+    if record.kind == Kind::Straight {
+        let back = &x[place.wrapping_add_signed(-delta as isize)..][..LANES];
+        for i in 0..LANES {
+            sum.0[i] += weight.0[i] * (there[i] + back[i]);
+        }
+    } else {
+        for i in 0..LANES {
+            sum.0[i] += weight.0[i] * there[i];
+        }
+    }
+}
+
+/// Adds the weights of some records times their data to `x`.
+#[inline(always)]
+fn scatter(
+    records: &[Record],
+    scratch: &Scratch,
+    data: &[Lanes; TOGETHER],
+    x: &mut [f32],
+    start: usize,
+) {
+    let most = scratch.iter().take(records.len()).map(|rows| rows.count).max().unwrap_or(0);
+    for k in 0..most {
+        for ((record, rows), data) in records.iter().zip(scratch).zip(data) {
+            if k >= rows.count {
+                continue;
+            }
+            let (weight, delta) = (&rows.weights[k], rows.deltas[k] as isize);
+            let place = start + record.column as usize;
+            let there = &mut x[place.wrapping_add_signed(delta)..][..LANES];
+            for i in 0..LANES {
+                there[i] += weight.0[i] * data.0[i];
+            }
+            if record.kind == Kind::Straight {
+                let back = &mut x[place.wrapping_add_signed(-delta)..][..LANES];
                 for i in 0..LANES {
-                    there[i] += weight.0[i] * data.0[i];
-                }
-                if record.kind == Kind::Straight {
-                    let back = &mut x[place.wrapping_add_signed(-delta)..][..LANES];
-                    for i in 0..LANES {
-                        back[i] += weight.0[i] * data.0[i];
-                    }
+                    back[i] += weight.0[i] * data.0[i];
                 }
             }
         }
