@@ -4,6 +4,8 @@
 //! the cubic, two for the triangle. Where the floors differ by one, each pixel's weights are moved up
 //! a row or not; where they differ by more, each row picks of each pixel's weights the one that falls on it.
 
+use multiversion::multiversion;
+
 use super::lanes::{LANES, Lanes, four_taps};
 use super::plan::{Kind, Record, RowPlan, line_of};
 
@@ -33,7 +35,7 @@ impl Expanded {
 }
 
 /// Writes out `record` of `plan` for a picture of rows of `stride` samples.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn expand<const CUBIC: bool>(
     plan: &RowPlan,
     record: &Record,

@@ -111,10 +111,7 @@ impl MotionOperator {
             for (i, out) in rows.chunks_mut(self.width).enumerate() {
                 let y = task * ROWS_PER_TASK + i;
                 let (plan, start) = (&self.plans[y], (y + pad) * stride + pad);
-                match self.taps {
-                    Taps::Cubic => gather_row::<true>(plan, x, stride, start, out, &mut scratch),
-                    Taps::Linear => gather_row::<false>(plan, x, stride, start, out, &mut scratch),
-                }
+                gather_row(plan, self.taps, x, stride, start, out, &mut scratch);
             }
         });
     }
@@ -127,14 +124,7 @@ impl MotionOperator {
             let mut scratch = Scratch::default();
             for (i, row) in rows.chunks(self.width).enumerate() {
                 let (plan, start) = (&self.plans[y + i], (i + self.reach) * stride + pad);
-                match self.taps {
-                    Taps::Cubic => {
-                        scatter_row::<true>(plan, row, stride, start, place, &mut scratch)
-                    }
-                    Taps::Linear => {
-                        scatter_row::<false>(plan, row, stride, start, place, &mut scratch)
-                    }
-                }
+                scatter_row(plan, self.taps, row, stride, start, place, &mut scratch);
             }
         });
     }
@@ -247,14 +237,7 @@ impl LinearOperator for MotionOperator {
             for (i, (b, weights)) in pairs.enumerate() {
                 let (from, to) = ((y + i + pad) * columns + pad, (i + self.reach) * columns + pad);
                 let (plan, scratch) = (&self.plans[y + i], &mut scratch);
-                match self.taps {
-                    Taps::Cubic => {
-                        normal_row::<true>(plan, x, weights, columns, from, b, place, to, scratch);
-                    }
-                    Taps::Linear => {
-                        normal_row::<false>(plan, x, weights, columns, from, b, place, to, scratch);
-                    }
-                }
+                normal_row(plan, self.taps, x, weights, columns, from, b, place, to, scratch);
             }
         });
     }

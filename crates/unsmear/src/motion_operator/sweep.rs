@@ -9,6 +9,7 @@
 
 use multiversion::multiversion;
 
+use super::Taps;
 use super::expand::{Expanded, expand};
 use super::lanes::{LANES, Lanes};
 use super::plan::{Kind, Record, RowPlan};
@@ -22,8 +23,9 @@ pub(super) type Scratch = [Expanded; TOGETHER];
 
 /// Writes a row of A x: `x` has rows of `stride` samples, and the row's first pixel is at `start`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn gather_row<const CUBIC: bool>(
+pub(super) fn gather_row(
     plan: &RowPlan,
+    taps: Taps,
     x: &[f32],
     stride: usize,
     start: usize,
@@ -32,7 +34,7 @@ pub(super) fn gather_row<const CUBIC: bool>(
 ) {
     out.fill(0.0);
     for record in &plan.records {
-        expand::<CUBIC>(plan, record, stride as i32, &mut scratch[0]);
+        expand_by(taps, plan, record, stride, &mut scratch[0]);
         let sum = gather(record, &scratch[0], x, start);
         take_own(plan, record, &sum, out);
     }
@@ -40,8 +42,9 @@ pub(super) fn gather_row<const CUBIC: bool>(
 
 /// Adds a row of data `r` through A^T to `x`; see [`gather_row`].
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn scatter_row<const CUBIC: bool>(
+pub(super) fn scatter_row(
     plan: &RowPlan,
+    taps: Taps,
     r: &[f32],
     stride: usize,
     start: usize,
@@ -51,7 +54,7 @@ pub(super) fn scatter_row<const CUBIC: bool>(
     for records in plan.records.chunks(TOGETHER) {
         let mut data = [Lanes::ZERO; TOGETHER];
         for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
-            expand::<CUBIC>(plan, record, stride as i32, rows);
+            expand_by(taps, plan, record, stride, rows);
             *data = lanes_at(r, record);
         }
         scatter(records, scratch, &data, x, start);
@@ -60,8 +63,9 @@ pub(super) fn scatter_row<const CUBIC: bool>(
 
 /// Writes a row of b = A x and adds A^T (weights b) of it to `out`, in which the row's first pixel is at `place`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn normal_row<const CUBIC: bool>(
+pub(super) fn normal_row(
     plan: &RowPlan,
+    taps: Taps,
     x: &[f32],
     weights: &[f32],
     stride: usize,
@@ -75,15 +79,21 @@ pub(super) fn normal_row<const CUBIC: bool>(
     for records in plan.records.chunks(TOGETHER) {
         let mut data = [Lanes::ZERO; TOGETHER];
         for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
-            expand::<CUBIC>(plan, record, stride as i32, rows);
+            expand_by(taps, plan, record, stride, rows);
             let sum = gather(record, rows, x, start);
             take_own(plan, record, &sum, b);
-            let weights = lanes_at(weights, record);
-            for i in 0..LANES {
-                data.0[i] = weights.0[i] * sum.0[i];
-            }
+            *data = product(&lanes_at(weights, record), &sum);
         }
         scatter(records, scratch, &data, out, place);
+    }
+}
+
+/// Writes out a record.
+#[inline(always)]
+fn expand_by(taps: Taps, plan: &RowPlan, record: &Record, stride: usize, rows: &mut Expanded) {
+    match taps {
+        Taps::Cubic => expand::<true>(plan, record, stride as i32, rows),
+        Taps::Linear => expand::<false>(plan, record, stride as i32, rows),
     }
 }
 
@@ -113,50 +123,54 @@ fn take_own(plan: &RowPlan, record: &Record, sum: &Lanes, row: &mut [f32]) {
 #[inline(always)]
 fn gather(record: &Record, rows: &Expanded, x: &[f32], start: usize) -> Lanes {
     let place = start + record.column as usize;
-    if record.kind == Kind::Still {
-        return lanes_at(&x[start..], record);
+    match record.kind {
+        Kind::Still => lanes_at(&x[start..], record),
+        Kind::Straight => gather_rows::<true>(rows, x, place),
+        Kind::Curved | Kind::Offset => gather_rows::<false>(rows, x, place),
     }
+}
+
+/// Sums of weights times samples, the latter together with their mirror images when `MIRRORED`.
+#[inline(always)]
+fn gather_rows<const MIRRORED: bool>(rows: &Expanded, x: &[f32], place: usize) -> Lanes {
+    let (weights, rest) = rows.weights[..rows.count].as_chunks::<4>();
+    let (deltas, rest_deltas) = rows.deltas[..rows.count].as_chunks::<4>();
     // Four sums, so that additions need not wait for each other.
-    let mut sums = [Lanes::ZERO; 4];
-    let (weights, deltas) = (&rows.weights[..rows.count], &rows.deltas[..rows.count]);
-    let (fours, rest) = (weights.chunks_exact(4), weights.chunks_exact(4).remainder());
-    let done = rows.count - rest.len();
-    for (weights, deltas) in fours.zip(deltas.chunks_exact(4)) {
-        for k in 0..4 {
-            add_product(&mut sums[k], record, &weights[k], x, place, deltas[k]);
-        }
+    let [mut a, mut b, mut c, mut d] = [Lanes::ZERO; 4];
+    for (weights, deltas) in weights.iter().zip(deltas) {
+        a = add_product::<MIRRORED>(&a, &weights[0], x, place, deltas[0]);
+        b = add_product::<MIRRORED>(&b, &weights[1], x, place, deltas[1]);
+        c = add_product::<MIRRORED>(&c, &weights[2], x, place, deltas[2]);
+        d = add_product::<MIRRORED>(&d, &weights[3], x, place, deltas[3]);
     }
-    for (weight, &delta) in rest.iter().zip(&deltas[done..]) {
-        add_product(&mut sums[0], record, weight, x, place, delta);
+    for (weight, &delta) in rest.iter().zip(rest_deltas) {
+        a = add_product::<MIRRORED>(&a, weight, x, place, delta);
     }
     let mut sum = Lanes::ZERO;
     for i in 0..LANES {
-        sum.0[i] = (sums[0].0[i] + sums[1].0[i]) + (sums[2].0[i] + sums[3].0[i]);
+        sum.0[i] = (a.0[i] + b.0[i]) + (c.0[i] + d.0[i]);
     }
     sum
 }
 
-/// `sum` += `weight` x.
+/// `sum` + `weight` x.
 #[inline(always)]
-fn add_product(
-    sum: &mut Lanes,
-    record: &Record,
+fn add_product<const MIRRORED: bool>(
+    sum: &Lanes,
     weight: &Lanes,
     x: &[f32],
     place: usize,
     delta: i32,
-) {
-    let there = &x[place.wrapping_add_signed(delta as isize)..][..LANES];
-    if record.kind == Kind::Straight {
-        let back = &x[place.wrapping_add_signed(-delta as isize)..][..LANES];
-        for i in 0..LANES {
-            sum.0[i] += weight.0[i] * (there[i] + back[i]);
-        }
-    } else {
-        for i in 0..LANES {
-            sum.0[i] += weight.0[i] * there[i];
-        }
+) -> Lanes {
+    let delta = delta as isize;
+    let there = &x[place.wrapping_add_signed(delta)..][..LANES];
+    let back = if MIRRORED { &x[place.wrapping_add_signed(-delta)..][..LANES] } else { there };
+    let mut out = Lanes::ZERO;
+    for i in 0..LANES {
+        let both = if MIRRORED { there[i] + back[i] } else { there[i] };
+        out.0[i] = sum.0[i] + weight.0[i] * both;
     }
+    out
 }
 
 /// Adds the weights of some records times their data to `x`.
@@ -176,16 +190,28 @@ fn scatter(
             }
             let (weight, delta) = (&rows.weights[k], rows.deltas[k] as isize);
             let place = start + record.column as usize;
-            let there = &mut x[place.wrapping_add_signed(delta)..][..LANES];
-            for i in 0..LANES {
-                there[i] += weight.0[i] * data.0[i];
-            }
+            let product = product(weight, data);
+            add(&mut x[place.wrapping_add_signed(delta)..][..LANES], &product);
             if record.kind == Kind::Straight {
-                let back = &mut x[place.wrapping_add_signed(-delta)..][..LANES];
-                for i in 0..LANES {
-                    back[i] += weight.0[i] * data.0[i];
-                }
+                add(&mut x[place.wrapping_add_signed(-delta)..][..LANES], &product);
             }
         }
+    }
+}
+
+#[inline(always)]
+fn product(a: &Lanes, b: &Lanes) -> Lanes {
+    let mut out = Lanes::ZERO;
+    for i in 0..LANES {
+        out.0[i] = a.0[i] * b.0[i];
+    }
+    out
+}
+
+#[inline(always)]
+fn add(x: &mut [f32], lanes: &Lanes) {
+    let x = &mut x[..LANES];
+    for i in 0..LANES {
+        x[i] += lanes.0[i];
     }
 }
