@@ -12,6 +12,7 @@ mod errors;
 mod flow;
 mod interpolate;
 mod metrics;
+mod motion_operator;
 mod parameters;
 mod psf;
 mod thesis;
@@ -39,6 +40,8 @@ mod _unsmear {
     use crate::interpolate::sample;
     #[pymodule_export]
     use crate::metrics::{error_map, psnr, ssim};
+    #[pymodule_export]
+    use crate::motion_operator::MotionOperator;
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]
