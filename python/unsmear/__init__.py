@@ -12,6 +12,7 @@ from unsmear.exposure import ExposureEstimate, estimate_exposure
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
+from unsmear.motion_operator import MotionOperator
 from unsmear.motions import Motion, several_motions, velocity_votes
 from unsmear.psf import fspecial_motion, motion_psf
 from unsmear.sequence import SequenceResult, deblur_sequence
@@ -25,6 +26,7 @@ __all__ = [
     "FlowFileError",
     "FlowResult",
     "Motion",
+    "MotionOperator",
     "SequenceResult",
     "__version__",
     "blur",
