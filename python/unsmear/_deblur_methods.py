@@ -142,6 +142,12 @@ def warnings_of(report: dict[str, Any]) -> list[str]:
             "the founding method makes pictures worse and blackens their border; "
             "it is kept for reference"
         )
+    if report.get("model_mismatch"):
+        warnings.append(
+            f"what the motion leaves unexplained is {report['mismatch']:.2f} times the "
+            "noise: flow or exposure are wrong somewhere, and the picture was restored "
+            "with more caution"
+        )
     unknown = report["unknown_pixels"]
     if unknown > COPIED_SHARE_WORTH_A_WARNING * report["pixels"]:
         warnings.append(

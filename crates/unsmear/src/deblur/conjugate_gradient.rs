@@ -67,12 +67,11 @@ impl NormalEquations<'_> {
         let mut square = dot(&scratch.residual, &scratch.residual);
         let enough = SETTLED * square;
         for taken in 0..steps {
-            if square <= enough {
-                return Ok(taken);
-            }
             control.check()?;
-            let curvature = self.product(scratch);
+            let curvature = if square > enough { self.product(scratch) } else { 0.0 };
             if !(curvature > 0.0) {
+                // The steps that were expected and are not needed.
+                (taken..steps).try_for_each(|_| control.advance())?;
                 return Ok(taken);
             }
             let alpha = (square / curvature) as f32;
@@ -114,5 +113,47 @@ impl NormalEquations<'_> {
             }
         }
         self.smoothness.add_gradient(direction, self.lambda, product)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel_operator::KernelOperator;
+    use ndarray::Array2;
+
+    #[test]
+    fn the_gradient_vanishes_at_the_solution() {
+        let shape = (9, 11);
+        let kernel = Array2::from_shape_vec((1, 3), vec![0.2, 0.5, 0.3]).unwrap();
+        let wave = |k: f32| Array2::from_shape_fn(shape, |(y, x)| (k * (3 * y + x) as f32).sin());
+        let operator = KernelOperator::new(&kernel.view(), shape, 2).unwrap();
+        let weights = wave(0.7).mapv(f32::abs);
+        let datum = |k| Datum::new(&operator, &[wave(k).view()], Some(weights.view())).unwrap();
+        let data = [datum(1.1), datum(0.4)];
+        let weights: Vec<Vec<f32>> = data.iter().map(|d| d.weights().to_vec()).collect();
+        let unknown = operator.unknown_shape();
+        let smoothness = Smoothness::uniform(unknown, 1.0);
+        let equations = NormalEquations {
+            data: &data,
+            weights: &weights,
+            smoothness: &smoothness,
+            lambda: 0.1,
+            channel: 0,
+        };
+        let mut x = vec![0.0; unknown.0 * unknown.1];
+        let mut scratch = Scratch::new(&data, x.len());
+        // Dirty: nothing of an earlier solve may matter.
+        scratch.share.fill(f32::NAN);
+        scratch.direction.fill(f32::NAN);
+        let control = Control::new();
+        control.expect(200);
+        equations.solve(&mut x, 200, &mut scratch, &control).unwrap();
+        equations.residual(&x, &mut scratch);
+        // Data of order 1 over some hundred single-precision steps.
+        assert!(scratch.residual.iter().all(|r| r.abs() < 1e-5));
+        assert_eq!(control.progress(), (200, 200));
+        control.cancel();
+        assert!(equations.solve(&mut x, 1, &mut scratch, &control).is_err());
     }
 }

@@ -57,16 +57,22 @@ impl Doubling {
     pub(super) fn apply(&self, plane: &[f32], control: &Control) -> Result<Vec<f32>> {
         let (columns, width) = (self.from.1, self.to.1);
         let mut out = vec![0.0; self.to.0 * width];
-        for_each_row_with(&mut out, width, control, || vec![0.0; columns], |y, out, line| {
-            let (rows, flip) = self.taps(y, self.from.0);
-            for (x, sum) in line.iter_mut().enumerate() {
-                *sum = (0..4).map(|k| weight(k, flip) * plane[rows[k] * columns + x]).sum();
-            }
-            for (x, out) in out.iter_mut().enumerate() {
-                let (at, flip) = self.taps(x, columns);
-                *out = (0..4).map(|k| weight(k, flip) * line[at[k]]).sum();
-            }
-        })?;
+        for_each_row_with(
+            &mut out,
+            width,
+            control,
+            || vec![0.0; columns],
+            |y, out, line| {
+                let (rows, flip) = self.taps(y, self.from.0);
+                for (x, sum) in line.iter_mut().enumerate() {
+                    *sum = (0..4).map(|k| weight(k, flip) * plane[rows[k] * columns + x]).sum();
+                }
+                for (x, out) in out.iter_mut().enumerate() {
+                    let (at, flip) = self.taps(x, columns);
+                    *out = (0..4).map(|k| weight(k, flip) * line[at[k]]).sum();
+                }
+            },
+        )?;
         Ok(out)
     }
 
@@ -91,7 +97,8 @@ mod tests {
 
     #[test]
     fn halves_means_and_weights() {
-        let plane = Array2::from_shape_vec((3, 2), vec![1.0, 2.0, 3.0, f32::NAN, 5.0, 6.0]).unwrap();
+        let plane =
+            Array2::from_shape_vec((3, 2), vec![1.0, 2.0, 3.0, f32::NAN, 5.0, 6.0]).unwrap();
         let weights = Array2::from_shape_vec((3, 2), vec![1.0, 1.0, 0.5, 0.0, 1.0, 0.0]).unwrap();
         let (small, weight) = halve(&[plane.view()], &weights.view());
         // (1 + 2 + 1.5) / 2.5; the last row is met twice, its second sample unknown.

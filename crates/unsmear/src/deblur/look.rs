@@ -26,7 +26,10 @@ pub(super) fn operators(looks: &[Look<'_>], taps: Taps) -> Result<(Vec<MotionOpe
 }
 
 /// The data of all looks.
-pub(super) fn data<'a>(looks: &[Look<'_>], operators: &'a [MotionOperator]) -> Result<Vec<Datum<'a>>> {
+pub(super) fn data<'a>(
+    looks: &[Look<'_>],
+    operators: &'a [MotionOperator],
+) -> Result<Vec<Datum<'a>>> {
     let datum = |(look, operator): (&Look<'_>, &'a MotionOperator)| {
         Datum::new(operator, &look.planes, Some(look.weights.view()))
     };

@@ -200,7 +200,9 @@ impl MotionDeblur {
                 let lambda = self.regularization;
                 Tikhonov { noise, lambda }.restore(look, control)
             }
-            MotionMethod::RichardsonLucy => RichardsonLucy { noise, ..RichardsonLucy::default() }.restore(look, control),
+            MotionMethod::RichardsonLucy => {
+                RichardsonLucy { noise, ..RichardsonLucy::default() }.restore(look, control)
+            }
         }
     }
 }
@@ -210,9 +212,8 @@ fn seen(look: &Look<'_>, pad: usize) -> Result<Array2<f32>> {
     let operator = MotionOperator::new(&look.paths, Taps::Linear, pad)?;
     let known = |at: (usize, usize)| look.planes.iter().all(|plane| plane[at].is_finite());
     let (height, width) = operator.data_shape();
-    let data: Vec<f32> = (0..height * width)
-        .map(|i| f32::from(u8::from(known((i / width, i % width)))))
-        .collect();
+    let data: Vec<f32> =
+        (0..height * width).map(|i| f32::from(u8::from(known((i / width, i % width))))).collect();
     let columns = operator.unknown_shape().1;
     let mut light = vec![0.0; operator.unknown_shape().0 * columns];
     operator.adjoint(&data, &mut light);
@@ -246,7 +247,11 @@ fn compose<T: Real>(
             let share = ((length - COPIED_BLUR) / (RESTORED_BLUR - COPIED_BLUR)).min(1.0);
             let old = sample.as_f64();
             // An unknown sample has nothing to fade from.
-            *sample = T::of(if share < 1.0 && old.is_finite() { old + share * (value - old) } else { value });
+            *sample = T::of(if share < 1.0 && old.is_finite() {
+                old + share * (value - old)
+            } else {
+                value
+            });
         }
     }
 }

@@ -15,10 +15,10 @@
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::datum::Datum;
+use super::datum::{Datum, check_looks, first_guess, residual_rms};
 use super::look::{Look, data, operators};
 use super::total_variation::Restored;
-use super::variational::{Solution, check_looks, first_guess, residual_rms};
+use super::variational::Solution;
 use super::vectors::add;
 use crate::control::Control;
 use crate::error::{Error, Result, require};

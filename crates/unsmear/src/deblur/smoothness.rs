@@ -61,8 +61,12 @@ impl Smoothness {
                 let mirrored =
                     |y: usize| mixed[y * width..][..width].iter().map(|t| -t).collect::<Vec<_>>();
                 let three = |plane| rows_of(plane, width, [above, y, below]);
-                let mut rows =
-                    Rows { p: three(p), mixed: three(mixed), down: three(down), right: &right[y * width..][..width] };
+                let mut rows = Rows {
+                    p: three(p),
+                    mixed: three(mixed),
+                    down: three(down),
+                    right: &right[y * width..][..width],
+                };
                 let (first, last);
                 if y == 0 {
                     first = mirrored(0);

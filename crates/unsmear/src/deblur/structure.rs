@@ -168,3 +168,84 @@ fn inverse_root(rounding: f32, structure: bool, rows: &mut [&mut [f32]; 3]) {
         b[x] *= -scale;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (6, 7);
+
+    fn wave(k: f32) -> Vec<f32> {
+        (0..SIZE.0 * SIZE.1).map(|i| 20.0 * (i as f32 * k).sin() + (i % 5) as f32).collect()
+    }
+
+    /// The prior by its definition: gradients, window, trace of the root.
+    fn value(prior: &Prior, channels: &[Vec<f32>]) -> f64 {
+        let (h, w) = SIZE;
+        let clamp = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;
+        let product = |y: usize, x: usize| {
+            let mut j = [0.0; 3];
+            for c in channels {
+                let at = |y: isize, x: isize| f64::from(c[clamp(y, h) * w + clamp(x, w)]);
+                let (y, x) = (y as isize, x as isize);
+                for gx in [at(y, x + 1) - at(y, x), at(y, x) - at(y, x - 1)] {
+                    for gy in [at(y + 1, x) - at(y, x), at(y, x) - at(y - 1, x)] {
+                        let share = 0.25 / channels.len() as f64;
+                        j = [
+                            j[0] + share * gx * gx,
+                            j[1] + share * gx * gy,
+                            j[2] + share * gy * gy,
+                        ];
+                    }
+                }
+            }
+            j
+        };
+        let side = if prior.structure { f64::from(SIDE) } else { 0.0 };
+        let mut sum = 0.0;
+        for y in 0..h as isize {
+            for x in 0..w as isize {
+                let mut j = [0.0; 3];
+                for (dy, dx) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dy, dx))) {
+                    let of = |d: isize| if d == 0 { 1.0 - 2.0 * side } else { side };
+                    let share = of(dy) * of(dx);
+                    let there = product(clamp(y + dy, h), clamp(x + dx, w));
+                    (0..3).for_each(|k| j[k] += share * there[k]);
+                }
+                let floor = f64::from(prior.rounding).powi(2);
+                sum += if prior.structure {
+                    let (a, c) = (j[0] + floor, j[2] + floor);
+                    // trace M^(1/2) = sqrt(trace M + 2 sqrt(det M)).
+                    (a + c + 2.0 * (a * c - j[1] * j[1]).sqrt()).sqrt()
+                } else {
+                    (j[0] + j[2] + floor).sqrt()
+                };
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn weights_give_the_gradient_of_the_prior() {
+        for structure in [false, true] {
+            let prior = Prior { rounding: 0.5, structure };
+            let channels = [wave(0.9), wave(1.7)];
+            let mut smoothness = Smoothness::uniform(SIZE, 1.0);
+            let mut scratch = [(); 3].map(|()| vec![f32::NAN; SIZE.0 * SIZE.1]);
+            let [a, b, c] = &mut scratch;
+            prior.renew(&channels, &mut smoothness, [a, b, c]);
+            let mut gradient = vec![0.0; SIZE.0 * SIZE.1];
+            smoothness.add_gradient(&channels[0], 1.0, &mut gradient);
+            for i in 0..gradient.len() {
+                let moved = |by: f32| {
+                    let mut other = channels.clone();
+                    other[0][i] += by;
+                    value(&prior, &other)
+                };
+                let slope = (moved(0.02) - moved(-0.02)) / 0.04;
+                // The mean over two channels halves the form's gradient; single precision and third derivatives.
+                assert!((slope - 0.5 * f64::from(gradient[i])).abs() < 2e-3, "{structure} {i}");
+            }
+        }
+    }
+}

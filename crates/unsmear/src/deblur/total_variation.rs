@@ -65,7 +65,10 @@ impl Effort {
     /// Conjugate-gradient steps for all channels.
     #[must_use]
     pub fn steps(&self, channels: usize) -> usize {
-        [self.half, self.first, self.second].iter().map(|(turns, steps)| turns * steps * channels).sum()
+        [self.half, self.first, self.second]
+            .iter()
+            .map(|(turns, steps)| turns * steps * channels)
+            .sum()
     }
 }
 

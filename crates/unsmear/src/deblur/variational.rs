@@ -13,7 +13,7 @@
 //! [10.1080/03610927708827533](https://doi.org/10.1080/03610927708827533), for the reweighting.
 
 use super::conjugate_gradient::{NormalEquations, Scratch};
-use super::datum::Datum;
+use super::datum::{Datum, check_looks, first_guess, residual_rms};
 use super::smoothness::Smoothness;
 use super::structure::Prior;
 use crate::control::Control;
@@ -21,9 +21,6 @@ use crate::error::{Error, Result, require};
 
 /// Weight of smoothness while nothing is known of the picture: an edge of 8 grey levels per px.
 const FIRST_WEIGHT: f32 = 0.125;
-
-/// Pixels at the edge of the data that do not count in the residual: there the padding can explain anything.
-const MARGIN: usize = 8;
 
 /// Strength, prior and effort of a restoration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +63,8 @@ impl Variational {
         let warm = start.is_some();
         let mut channels = start.unwrap_or_else(|| first_guess(&data[0]));
         let mut scratch = Scratch::new(data, shape.0 * shape.1);
-        let mut smoothness = Smoothness::uniform(shape, if self.prior.is_some() { FIRST_WEIGHT } else { 1.0 });
+        let mut smoothness =
+            Smoothness::uniform(shape, if self.prior.is_some() { FIRST_WEIGHT } else { 1.0 });
         let mut weights: Vec<Vec<f32>> = data.iter().map(|d| d.weights().to_vec()).collect();
         let mut taken = 0;
         for turn in 0..self.turns {
@@ -114,49 +112,6 @@ impl Variational {
     }
 }
 
-/// The shape of the unknown that all looks share.
-///
-/// # Errors
-/// [`Error::Value`] when there is none, or they differ in it or in their number of channels.
-pub(super) fn check_looks(data: &[Datum<'_>]) -> Result<(usize, usize)> {
-    let Some(first) = data.first() else {
-        return Err(Error::value("data", "at least one datum", 0));
-    };
-    let (shape, channels) = (first.operator().unknown_shape(), first.planes().len());
-    if data.iter().any(|d| d.operator().unknown_shape() != shape) {
-        return Err(Error::value("data", "operators with one unknown shape", "several"));
-    }
-    if data.iter().any(|d| d.planes().len() != channels) {
-        return Err(Error::value("data", "looks of the same number of channels", "others"));
-    }
-    Ok(shape)
-}
-
-/// The data of a look continued over the padding by their edge samples; unknown samples take the last known of their row.
-pub(super) fn first_guess(datum: &Datum<'_>) -> Vec<Vec<f32>> {
-    let operator = datum.operator();
-    let ((rows, columns), pad) = (operator.unknown_shape(), operator.pad());
-    let (height, width) = operator.data_shape();
-    let guess = |plane: &Vec<f32>| {
-        let mut out = Vec::with_capacity(rows * columns);
-        let mut line = vec![0.0; width];
-        for y in 0..rows {
-            let from = y.saturating_sub(pad).min(height - 1) * width;
-            let weights = &datum.weights()[from..from + width];
-            let mut last = weights.iter().position(|&w| w > 0.0).map_or(0.0, |i| plane[from + i]);
-            for x in 0..width {
-                if weights[x] > 0.0 {
-                    last = plane[from + x];
-                }
-                line[x] = last;
-            }
-            out.extend((0..columns).map(|x| line[x.saturating_sub(pad).min(width - 1)]));
-        }
-        out
-    };
-    datum.planes().iter().map(guess).collect()
-}
-
 /// Given weights times Cauchy's, from the residuals of all channels.
 fn reweight(
     data: &[Datum<'_>],
@@ -182,24 +137,114 @@ fn reweight(
     }
 }
 
-/// See [`Solution::residual`].
-pub(super) fn residual_rms(data: &[Datum<'_>], channels: &[Vec<f32>], blurred: &mut [f32]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for datum in data {
-        let (height, width) = datum.operator().data_shape();
-        let margin = MARGIN.min((height.min(width).saturating_sub(1)) / 2);
-        let blurred = &mut blurred[..height * width];
-        for (x, plane) in channels.iter().zip(datum.planes()) {
-            datum.operator().apply(x, blurred);
-            for y in margin..height - margin {
-                let inside = y * width + margin..(y + 1) * width - margin;
-                let weights = &datum.weights()[inside.clone()];
-                for ((a, b), &w) in blurred[inside.clone()].iter().zip(&plane[inside]).zip(weights) {
-                    sum += f64::from(w) * f64::from(a - b).powi(2);
-                    count += f64::from(w);
-                }
-            }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel_operator::KernelOperator;
+    use ndarray::{Array2, ArrayView2};
+
+    const SHAPE: (usize, usize) = (24, 30);
+
+    fn box_of(width: usize) -> KernelOperator {
+        let kernel = Array2::from_elem((1, width), 1.0 / width as f32);
+        KernelOperator::new(&kernel.view(), SHAPE, 6).unwrap()
+    }
+
+    /// Blocks of 50 grey levels on the padded grid.
+    fn blocks(operator: &KernelOperator) -> Vec<f32> {
+        let (rows, columns) = operator.unknown_shape();
+        let block =
+            |i: usize| if (i / columns / 9 + i % columns / 8) % 2 == 0 { 50.0 } else { 0.0 };
+        (0..rows * columns).map(block).collect()
+    }
+
+    fn blurred(operator: &KernelOperator) -> Array2<f32> {
+        let mut out = Array2::zeros(SHAPE);
+        operator.apply(&blocks(operator), out.as_slice_mut().unwrap());
+        out
+    }
+
+    fn method() -> Variational {
+        let prior = Some(Prior { rounding: 0.1, structure: false });
+        Variational { lambda: 0.02, prior, robust: None, turns: 8, steps: 15 }
+    }
+
+    /// Worst error over the data's own pixels, 4 px from their edge.
+    fn worst(operator: &KernelOperator, channel: &[f32]) -> f32 {
+        let (sharp, columns) = (blocks(operator), operator.unknown_shape().1);
+        let inside = (10..26).flat_map(|y| (10..32).map(move |x| y * columns + x));
+        inside.map(|i| (sharp[i] - channel[i]).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn blocks_come_back_from_a_box() {
+        let operator = box_of(5);
+        let planes = [blurred(&operator)];
+        let data = [Datum::new(&operator, &planes.each_ref().map(|p| p.view()), None).unwrap()];
+        let found = method().solve(&data, None, &Control::new()).unwrap();
+        // Total variation lowers a block of 8 px by lambda over half of that.
+        assert!(
+            worst(&operator, &found.channels[0]) < 0.5,
+            "{}",
+            worst(&operator, &found.channels[0])
+        );
+        assert!(found.residual < 0.05 && found.steps == 120);
+        // Two looks: what one box cannot see the other does. An empty third one changes nothing.
+        let other = box_of(3);
+        let more = [
+            Datum::new(&operator, &[planes[0].view()], None).unwrap(),
+            Datum::new(&other, &[blurred(&other).view()], None).unwrap(),
+        ];
+        let joint = method().solve(&more, None, &Control::new()).unwrap();
+        assert!(worst(&operator, &joint.channels[0]) < worst(&operator, &found.channels[0]));
+    }
+
+    #[test]
+    fn an_outlier_is_not_believed_and_an_unknown_sample_not_missed() {
+        let operator = box_of(5);
+        let mut plane = blurred(&operator);
+        plane[(12, 15)] += 200.0;
+        let solve = |plane: ArrayView2<'_, f32>, robust| {
+            let data = [Datum::new(&operator, &[plane], None).unwrap()];
+            let method = Variational { robust, ..method() };
+            worst(&operator, &method.solve(&data, None, &Control::new()).unwrap().channels[0])
+        };
+        let (fooled, robust) = (solve(plane.view(), None), solve(plane.view(), Some(2.0)));
+        assert!(robust < 2.0 && fooled > 20.0, "{robust} {fooled}");
+        plane[(12, 15)] = f32::NAN;
+        assert!(solve(plane.view(), None) < 1.0);
+    }
+
+    #[test]
+    fn equal_channels_are_solved_like_one_and_bytes_do_not_depend_on_threads() {
+        let operator = box_of(5);
+        let plane = blurred(&operator);
+        let run = |channels: usize, threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let data = [Datum::new(&operator, &vec![plane.view(); channels], None).unwrap()];
+            let method = Variational { robust: Some(2.0), ..method() };
+            pool.install(|| method.solve(&data, None, &Control::new())).unwrap()
+        };
+        let grey = run(1, 1);
+        assert_eq!(grey, run(1, 3));
+        // The mean over channels of equal products rounds differently from the product.
+        for channel in run(3, 2).channels {
+            assert!(channel.iter().zip(&grey.channels[0]).all(|(a, b)| (a - b).abs() < 0.02));
         }
     }
-    (sum / count).sqrt()
+
+    #[test]
+    fn refuses_what_it_cannot_solve() {
+        let operator = box_of(3);
+        let plane = blurred(&operator);
+        let datum = || Datum::new(&operator, &[plane.view()], None).unwrap();
+        let message = |method: Variational, data: &[Datum<'_>]| {
+            method.solve(data, None, &Control::new()).unwrap_err().to_string()
+        };
+        assert_eq!(message(method(), &[]), "data must be at least one datum, got 0");
+        let bad = Variational { lambda: -1.0, ..method() };
+        assert_eq!(message(bad, &[datum()]), "lambda must be finite and positive, got -1");
+        let start = Some(vec![vec![0.0; 3]]);
+        assert!(method().solve(&[datum()], start, &Control::new()).is_err());
+    }
 }

@@ -36,9 +36,7 @@ pub(super) fn step(x: &mut [f32], p: &[f32], r: &mut [f32], q: &[f32], alpha: f3
 
 /// `r + beta p` into p.
 pub(super) fn direction(p: &mut [f32], r: &[f32], beta: f32) {
-    p.par_chunks_mut(BLOCK)
-        .zip(r.par_chunks(BLOCK))
-        .for_each(|(p, r)| block_direction(p, r, beta));
+    p.par_chunks_mut(BLOCK).zip(r.par_chunks(BLOCK)).for_each(|(p, r)| block_direction(p, r, beta));
 }
 
 /// `a + b` into a.
