@@ -137,15 +137,15 @@ def _third_order(
     """Return the corrections of velocity and acceleration; NaN where not known."""
     two = None if after is None else composed(one, after)
     back_two = None if before is None else composed(back, before)
-    none = np.zeros_like(one)
+    change, bend = np.zeros_like(one), np.zeros_like(one)
     if two is not None and back_two is not None:
-        change = (2 * (one - back) - (two - back_two)) / 12
-        return change, (4 * (one + back) - (two + back_two)) / 12
-    if two is not None:
-        return (3 * one + back - two) / 6, none
-    if back_two is not None:
-        return -(3 * back + one - back_two) / 6, none
-    return none, none
+        change[:] = (2 * (one - back) - (two - back_two)) / 12
+        bend[:] = (4 * (one + back) - (two + back_two)) / 12
+    elif two is not None:
+        change[:] = (3 * one + back - two) / 6
+    elif back_two is not None:
+        change[:] = (back_two - 3 * back - one) / 6
+    return change, bend
 
 
 def _carried_on(correction: Field, velocity: Field) -> Field:
