@@ -120,6 +120,7 @@ impl NormalEquations<'_> {
 mod tests {
     use super::*;
     use crate::kernel_operator::KernelOperator;
+    use crate::linear_operator::LinearOperator;
     use ndarray::Array2;
 
     #[test]
