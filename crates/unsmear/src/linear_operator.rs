@@ -38,4 +38,15 @@ pub trait LinearOperator: Sync {
     /// # Panics
     /// When a slice has not the length of its shape.
     fn adjoint(&self, r: &[f32], x: &mut [f32]);
+
+    /// Writes b = A x and A^T (`weights` b) to `out`: what a step of conjugate gradients needs of a weighted least
+    /// squares problem. Implementations may do both at less than the price of either after the other.
+    ///
+    /// # Panics
+    /// When a slice has not the length of its shape.
+    fn normal(&self, x: &[f32], weights: &[f32], b: &mut [f32], out: &mut [f32]) {
+        self.apply(x, b);
+        let weighted: Vec<f32> = b.iter().zip(weights).map(|(b, weight)| b * weight).collect();
+        self.adjoint(&weighted, out);
+    }
 }

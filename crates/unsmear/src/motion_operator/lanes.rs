@@ -117,18 +117,6 @@ fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// kappa(z).
-#[inline(always)]
-pub(super) fn kernel<const CUBIC: bool>(z: f32) -> f32 {
-    let n = least(z.abs(), 1.0);
-    if !CUBIC {
-        return 1.0 - n;
-    }
-    let r = least(most(z.abs() - 1.0, 0.0), 1.0);
-    let s = 1.0 - r;
-    1.0 + n * n * (1.5 * n - 2.5) - 0.5 * r * s * s
-}
-
 /// C(z).
 #[inline(always)]
 pub(super) fn integral<const CUBIC: bool>(z: f32) -> f32 {

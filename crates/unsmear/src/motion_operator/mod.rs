@@ -40,7 +40,7 @@ use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
 use lanes::LANES;
 use plan::RowPlan;
-use sweep::{Scratch, gather_row, scatter_row};
+use sweep::{Scratch, gather_row, normal_row, scatter_row};
 
 /// Rows gathered per task.
 const ROWS_PER_TASK: usize = 8;
@@ -111,10 +111,7 @@ impl MotionOperator {
             for (i, out) in rows.chunks_mut(self.width).enumerate() {
                 let y = task * ROWS_PER_TASK + i;
                 let (plan, start) = (&self.plans[y], (y + pad) * stride + pad);
-                match self.taps {
-                    Taps::Cubic => gather_row::<true>(plan, x, stride, start, out, &mut scratch),
-                    Taps::Linear => gather_row::<false>(plan, x, stride, start, out, &mut scratch),
-                }
+                gather_row(plan, self.taps, x, stride, start, out, &mut scratch);
             }
         });
     }
@@ -122,27 +119,43 @@ impl MotionOperator {
     /// A^T r for a padding that clamps nothing.
     fn scatter(&self, r: &[f32], pad: usize, x: &mut [f32]) {
         let stride = self.width + 2 * pad;
-        let band = LEAST_BAND.max(2 * self.reach);
+        let rows = r.par_chunks(self.width * self.band());
+        self.for_each_band(x, pad, rows, |y, place, rows| {
+            let mut scratch = Scratch::default();
+            for (i, row) in rows.chunks(self.width).enumerate() {
+                let (plan, start) = (&self.plans[y + i], (i + self.reach) * stride + pad);
+                scatter_row(plan, self.taps, row, stride, start, place, &mut scratch);
+            }
+        });
+    }
+
+    /// Rows of data scattered by one task: twice what it writes beyond them, so that every other one may run.
+    fn band(&self) -> usize {
+        LEAST_BAND.max(2 * self.reach)
+    }
+
+    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel, after
+    /// x was set to 0.
+    fn for_each_band<D: Send>(
+        &self,
+        x: &mut [f32],
+        pad: usize,
+        data: impl IndexedParallelIterator<Item = D>,
+        task: impl Fn(usize, &mut [f32], D) + Sync,
+    ) {
+        let (stride, band) = (self.width + 2 * pad, self.band());
         x.par_chunks_mut(stride * ROWS_PER_TASK).for_each(|rows| rows.fill(0.0));
-        for phase in 0..2 {
+        let data: Vec<D> = data.collect();
+        let (mut even, mut odd) = (Vec::new(), Vec::new());
+        for (i, data) in data.into_iter().enumerate() {
+            if i % 2 == 0 { even.push(data) } else { odd.push(data) }
+        }
+        for (phase, data) in [even, odd].into_iter().enumerate() {
             // Band number i writes from `reach` rows above its first to as many below its last.
             let above = ((pad - self.reach + phase * band) * stride).min(x.len());
-            let places = x[above..].par_chunks_mut(2 * band * stride).enumerate();
-            places.for_each(|(i, place)| {
-                let mut scratch = Scratch::default();
-                let first = (2 * i + phase) * band;
-                for y in first..(first + band).min(self.plans.len()) {
-                    let (plan, start) = (&self.plans[y], (y - first + self.reach) * stride + pad);
-                    let row = &r[y * self.width..][..self.width];
-                    match self.taps {
-                        Taps::Cubic => {
-                            scatter_row::<true>(plan, row, stride, start, place, &mut scratch);
-                        }
-                        Taps::Linear => {
-                            scatter_row::<false>(plan, row, stride, start, place, &mut scratch);
-                        }
-                    }
-                }
+            let places = x[above..].par_chunks_mut(2 * band * stride);
+            places.zip(data).enumerate().for_each(|(i, (place, data))| {
+                task((2 * i + phase) * band, place, data);
             });
         }
     }
@@ -200,6 +213,33 @@ impl LinearOperator for MotionOperator {
                 row[self.clamped(x, columns)] += sample;
             }
         }
+    }
+
+    fn normal(&self, x: &[f32], weights: &[f32], b: &mut [f32], out: &mut [f32]) {
+        let (rows, columns) = self.unknown_shape();
+        assert_eq!(
+            [x.len(), out.len()],
+            [rows * columns; 2],
+            "x, out have the shape of the unknown"
+        );
+        let count = self.plans.len() * self.width;
+        assert_eq!([weights.len(), b.len()], [count; 2], "weights, b have the shape of the data");
+        if self.reach > self.pad {
+            self.apply(x, b);
+            let weighted: Vec<f32> = b.iter().zip(weights).map(|(b, w)| b * w).collect();
+            return self.adjoint(&weighted, out);
+        }
+        let (pad, chunk) = (self.pad, self.width * self.band());
+        let data = b.par_chunks_mut(chunk).zip(weights.par_chunks(chunk));
+        self.for_each_band(out, pad, data, |y, place, (b, weights)| {
+            let mut scratch = Scratch::default();
+            let pairs = b.chunks_mut(self.width).zip(weights.chunks(self.width));
+            for (i, (b, weights)) in pairs.enumerate() {
+                let (from, to) = ((y + i + pad) * columns + pad, (i + self.reach) * columns + pad);
+                let (plan, scratch) = (&self.plans[y + i], &mut scratch);
+                normal_row(plan, self.taps, x, weights, columns, from, b, place, to, scratch);
+            }
+        });
     }
 }
 

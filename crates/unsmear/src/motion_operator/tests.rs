@@ -105,3 +105,23 @@ fn constants_stay_and_stillness_copies() {
         assert_eq!(dot(&back, &back), dot(&b, &b));
     }
 }
+
+#[test]
+fn the_normal_map_is_both_maps_in_turn() {
+    let shape = (33, 45);
+    for paths in all_paths(shape) {
+        for pad in [2, paths.reach()] {
+            let operator = MotionOperator::new(&paths, Taps::Cubic, pad).unwrap();
+            let (rows, columns) = operator.unknown_shape();
+            let x = noise(rows * columns, 5);
+            let weights: Vec<f32> = noise(33 * 45, 6).iter().map(|w| w.abs()).collect();
+            let (mut b, mut out) = (vec![f32::NAN; weights.len()], vec![f32::NAN; x.len()]);
+            operator.normal(&x, &weights, &mut b, &mut out);
+            let (mut alone, mut back) = (b.clone(), out.clone());
+            operator.apply(&x, &mut alone);
+            let weighted: Vec<f32> = alone.iter().zip(&weights).map(|(b, w)| b * w).collect();
+            operator.adjoint(&weighted, &mut back);
+            assert_eq!((alone, back), (b, out));
+        }
+    }
+}
