@@ -135,13 +135,14 @@ def deblur(
 
     A the mean over the exposure along each pixel's own curved path, :math:`\rho` a
     square or Cauchy's function, J the structure tensor of x over 3 x 3 px, p = 1/2
-    (1, convex, where the motion proves wrong), by iteratively reweighted least squares with conjugate
-    gradients, at half size first. Grey levels are those of the picture scaled to
-    standard deviation 50, so that a I + b is restored like I. Data whose path crosses
-    a jump of the flow are not believed, clipped ones (white of integers) only as lower
-    bounds, and unknown (NaN) ones not at all: what they would say of a pixel is taken from others that its light fell on, and where less than a quarter
-    of it fell on known pixels the result is NaN. Iterations couple all pixels; beyond
-    a few blur lengths the effect of an unknown pixel is far below a grey level.
+    (1, convex, where the motion proves wrong), by iteratively reweighted least squares
+    with conjugate gradients, at half size first. Grey levels are those of the picture
+    scaled to standard deviation 50, so that a I + b is restored like I. Data whose path
+    crosses a jump of the flow are not believed, clipped ones (white of integers) only
+    as lower bounds, and unknown (NaN) ones not at all: what they would say of a pixel
+    is taken from others that its light fell on, and where less than a quarter of it
+    fell on known pixels the result is NaN. Iterations couple all pixels; beyond a few
+    blur lengths the effect of an unknown pixel is far below a grey level.
 
     Blur below 1/2 px is left alone bit for bit, fading in up to 1 px; beyond 200 px
     it is left alone too. "wiener" applies, along the streamline through p on which
@@ -158,9 +159,9 @@ def deblur(
     ----------
     S. Lefkimmiatis, A. Roussos, P. Maragos, M. Unser, SIAM J. Imaging Sci. 8 (2015)
     1090-1122, doi:10.1137/14098154X. L. I. Rudin, S. Osher, E. Fatemi, Physica D 60
-    (1992) 259-268, doi:10.1016/0167-2789(92)90242-F. W. H. Richardson, J. Opt. Soc. Am. 62 (1972)
-    55-59, doi:10.1364/JOSA.62.000055. B. R. Hunt, IEEE Trans. Computers C-22 (1973)
-    805-812, doi:10.1109/TC.1973.5009169. N. Levinson, J. Math. Phys. 25 (1946)
+    (1992) 259-268, doi:10.1016/0167-2789(92)90242-F. W. H. Richardson, J. Opt. Soc. Am.
+    62 (1972) 55-59, doi:10.1364/JOSA.62.000055. B. R. Hunt, IEEE Trans. Computers C-22
+    (1973) 805-812, doi:10.1109/TC.1973.5009169. N. Levinson, J. Math. Phys. 25 (1946)
     261-278, doi:10.1002/sapm1946251261. C. Texin, MIT MEng thesis, 2007, section 4.2.
 
     Examples
