@@ -99,7 +99,12 @@ def row(
 ) -> dict[str, Any]:
     """Restore ``indices`` and compare with ``sharp[truths]``."""
     started = time.perf_counter()
-    result = unsmear.deblur_sequence(blurred, indices=indices, joint=joint)
+    result = unsmear.deblur_sequence(
+        blurred,
+        indices=indices,
+        joint=joint,
+        channel_axis=3 if blurred.ndim == 4 else None,
+    )
     seconds = (time.perf_counter() - started) / len(indices)
     before = [psnr(blurred[i], sharp[t]) for i, t in zip(indices, truths, strict=True)]
     after = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unsmear import metrics, plot, synthetic
+from unsmear import metrics, noise, plot, synthetic
 from unsmear._unsmear import __version__, get_num_threads, set_num_threads
 from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
@@ -39,6 +39,7 @@ __all__ = [
     "get_num_threads",
     "metrics",
     "motion_psf",
+    "noise",
     "optical_flow",
     "plot",
     "read_flow",

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 WIDEST_EXACT_INTEGER = 2  # bytes: float32 holds 24 bits
 WIDEST_EXACT_FLOAT = 4  # bytes
 
+CLIPPED = 254.5 / 255  # of white
+
 
 class Channels:
     """A picture split into channels, which remembers how to become a picture again.
@@ -45,6 +47,9 @@ class Channels:
         Integers divided by their type's maximum.
     scale : float
         What that division was by; 1 for floats.
+    ceiling : float or None
+        Least value of a clipped sample, half an 8-bit step below white; None for
+        floats, whose white is not known.
     """
 
     array: NDArray[np.float32] | NDArray[np.float64]
@@ -53,6 +58,7 @@ class Channels:
         self._like = as_picture_array(image, "image")
         self._channel_axis = channel_axis
         self.scale = scale_of(np.asanyarray(image).dtype)
+        self.ceiling = CLIPPED if self.scale != 1.0 else None
         if channel_axis is None:
             require_ndim(
                 self._like, "image", 2, "(H, W) (or say which channel_axis is colour)"

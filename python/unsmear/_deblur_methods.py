@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
     from unsmear._channels import Channels
     from unsmear._progress import Progress
+    from unsmear._tone import Tone
 
     Outcome = tuple[NDArray[Any], dict[str, Any]]
 
 COPIED_SHARE_WORTH_A_WARNING = 0.5
 
-MISMATCH_WORTH_A_WARNING = 1.03
-"""Residual over noise: a right model overfits a little and stays below 1."""
+MISMATCH_WORTH_A_WARNING = 1.0
+"""Residual over noise, the operator's own error included: a right model stays below."""
 
 
 def variational(
@@ -34,45 +35,88 @@ def variational(
     weights: ArrayLike | None,
     noise: float | None,
     regularization: float | None,
+    tone: Tone | None,
     progress: Progress | None,
 ) -> Outcome:
     """Restore by "tv", "fast", "tikhonov" or "richardson-lucy"."""
-    # Tikhonov's strength has no unit, that of total variation is an intensity.
-    unit = 1.0 if method == "tikhonov" else channels.scale
+    motion = channels.flow(flow)
+    bend = None if acceleration is None else channels.flow(acceleration, "acceleration")
+    known = None if weights is None else channels.weights(weights)
+    planes, spread = channels.array, 1.0
+    if noise is not None:
+        noise = float(noise) / channels.scale
+    ceiling = channels.ceiling
+    if tone is not None:
+        planes = tone.light(channels.array)
+        slope = tone.slope(channels.array)
+        spread = float(np.sqrt(np.nanmean(slope**2)))
+        known = _believed_in_light(slope, spread, known)
+        if noise is None:
+            noise = noise_of(channels, motion, exposure)
+        if ceiling is not None:
+            ceiling = float(tone.light(np.asarray(ceiling)))
+    # Units of the core's results in those of the picture that came. Tikhonov's strength
+    # has no unit, that of total variation is an intensity.
+    unit = channels.scale / spread
+    strength_unit = 1.0 if method == "tikhonov" else unit
     single = channels.array.itemsize == 4
-    planes, report = (
-        _unsmear.motion_deblur_f32 if single else _unsmear.motion_deblur_f64
-    )(
-        channels.array,
-        channels.flow(flow),
+    function = _unsmear.motion_deblur_f32 if single else _unsmear.motion_deblur_f64
+    restored, report = function(
+        planes,
+        motion,
         method,
         exposure,
-        acceleration=(
-            None
-            if acceleration is None
-            else channels.flow(acceleration, "acceleration")
+        acceleration=bend,
+        weights=known,
+        noise=None if noise is None else noise * spread,
+        regularization=(
+            None if regularization is None else float(regularization) / strength_unit
         ),
-        weights=None if weights is None else channels.weights(weights),
-        noise=None if noise is None else float(noise) / channels.scale,
-        regularization=None if regularization is None else float(regularization) / unit,
+        ceiling=ceiling,
         progress=of_steps(progress),
     )
-    report = {
+    if tone is not None:
+        # What was copied is copied bit for bit.
+        restored = np.where(restored == planes, channels.array, tone.code(restored))
+    return restored, _in_units(report, unit, strength_unit)
+
+
+def noise_of(channels: Channels, motion: NDArray[Any], exposure: float) -> float:
+    """Return the root mean square over channels of their noise, white being 1."""
+    wide = motion.astype(np.float64)
+    powers = [
+        _unsmear.estimate_noise(plane, wide, exposure) ** 2
+        for plane in channels.array.astype(np.float64)
+    ]
+    return float(np.sqrt(np.mean(powers)))
+
+
+def _believed_in_light(
+    slope: NDArray[np.float64], spread: float, weights: NDArray[np.float32] | None
+) -> NDArray[np.float32]:
+    """Return weights against noise that decoding made larger in bright pixels."""
+    power = np.nan_to_num(np.mean(slope**2, axis=0), nan=spread**2)
+    believed = np.minimum(1.0, spread**2 / power).astype(np.float32)
+    return believed if weights is None else believed * weights
+
+
+def _in_units(
+    report: dict[str, Any], unit: float, strength_unit: float
+) -> dict[str, Any]:
+    """Return the core's report in the units of the picture, None for what is not."""
+    result = {
         key: None if isinstance(value, float) and np.isnan(value) else value
         for key, value in report.items()
     }
-    for key, scale in (
-        ("noise", channels.scale),
-        ("residual", channels.scale),
-        ("regularization", unit),
-    ):
-        if report[key] is not None:
-            report[key] *= scale
-    mismatch = report["mismatch"]
-    report["model_mismatch"] = bool(
+    units = {"noise": unit, "residual": unit, "regularization": strength_unit}
+    for key, scale in units.items():
+        if result[key] is not None:
+            result[key] *= scale
+    mismatch = result["mismatch"]
+    result["model_mismatch"] = (
         mismatch is not None and mismatch > MISMATCH_WORTH_A_WARNING
     )
-    return planes, report
+    return result
 
 
 def wiener(

@@ -25,6 +25,7 @@ __all__ = [
     "component_velocities",
     "correlate_separable",
     "error_map",
+    "estimate_noise",
     "fleet_jepson",
     "fspecial_motion",
     "gabor_phase_gradient",
@@ -214,6 +215,7 @@ def motion_deblur_f32(
     weights: _Single | None = None,
     noise: float | None = None,
     regularization: float | None = None,
+    ceiling: float | None = None,
     progress: _Progress | None = None,
 ) -> tuple[_Single, dict[str, Any]]: ...
 def motion_deblur_f64(
@@ -226,6 +228,7 @@ def motion_deblur_f64(
     weights: _Single | None = None,
     noise: float | None = None,
     regularization: float | None = None,
+    ceiling: float | None = None,
     progress: _Progress | None = None,
 ) -> tuple[_Double, dict[str, Any]]: ...
 def thesis_deblur(
@@ -265,9 +268,11 @@ def restore_looks(
     looks: Sequence[Mapping[str, Any]],
     pad: int,
     lambdas: Sequence[float],
+    noise: float,
     robust: float,
     first: tuple[int, int],
     following: tuple[int, int],
+    sharp: bool = False,
     start: _Single | None = None,
     progress: _Progress | None = None,
 ) -> tuple[list[_Single], list[float]]: ...
@@ -303,6 +308,7 @@ class MotionOperator:
 
 # Metrics.
 
+def estimate_noise(image: _Double, flow: _Double, exposure: float) -> float: ...
 def error_map(name: str, flow: _Double, truth: _Double) -> _Double: ...
 def psnr(a: _Double, b: _Double, data_range: float) -> float: ...
 def ssim(a: _Double, b: _Double, data_range: float) -> float: ...

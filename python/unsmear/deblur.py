@@ -9,6 +9,7 @@ import numpy as np
 
 from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
+from unsmear._tone import tone_of
 from unsmear.exposure import estimate_exposure
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def deblur(
     weights: ArrayLike | None = None,
     noise: float | None = None,
     regularization: float | None = None,
+    gamma: float | str | None = None,
     degree: int = 4,
     channel_axis: int | None = None,
     progress: Progress | None = None,
@@ -101,6 +103,11 @@ def deblur(
         the power :math:`|K|^2 \le 1` of the blur; default from the noise and the
         strength of the detail around each pixel. "thesis": 0.02 as in the founding
         work.
+    gamma : float or "srgb", optional
+        How light was coded: ``code = light^(1 / gamma)``, white 1 (integers: their
+        largest value), or sRGB's law. Motion adds light; the difference shows where
+        bright meets dark. Default: the picture is restored as it is, which is right
+        for linear data. Unused by "wiener" and "thesis".
     degree : int, default 4
         Interpolation degree 1 to 4 of "thesis"; unused otherwise.
     channel_axis : int, optional
@@ -127,16 +134,18 @@ def deblur(
     "tv" finds the picture x, padding around it included, that minimises
 
     .. math:: \tfrac12 \sum_i w_i \rho((A x - b)_i)
-              + \lambda \sum_p \sqrt{|\nabla x|_p^2 + \epsilon^2},
+              + \tfrac{\lambda}{p} \sum \operatorname{tr} (J + \epsilon^2 I)^{p/2},
 
     A the mean over the exposure along each pixel's own curved path, :math:`\rho` a
-    square or Cauchy's function, by iteratively reweighted least squares with conjugate
-    gradients, at half size first. Grey levels are those of the picture scaled to
-    standard deviation 50, so that a I + b is restored like I. Data whose path crosses
-    a jump of the flow are not believed, nor are unknown (NaN) ones: what they say of a
-    pixel is taken from others that its light fell on, and where less than a quarter
-    of it fell on known pixels the result is NaN. Iterations couple all pixels; beyond
-    a few blur lengths the effect of an unknown pixel is far below a grey level.
+    square or Cauchy's function, J the structure tensor of x over 3 x 3 px, p = 1/2
+    (1, convex, where the motion proves wrong), by iteratively reweighted least squares
+    with conjugate gradients, at half size first. Grey levels are those of the picture
+    scaled to standard deviation 50, so that a I + b is restored like I. Data whose path
+    crosses a jump of the flow are not believed, clipped ones (white of integers) only
+    as lower bounds, and unknown (NaN) ones not at all: what they would say of a pixel
+    is taken from others that its light fell on, and where less than a quarter of it
+    fell on known pixels the result is NaN. Iterations couple all pixels; beyond a few
+    blur lengths the effect of an unknown pixel is far below a grey level.
 
     Blur below 1/2 px is left alone bit for bit, fading in up to 1 px; beyond 200 px
     it is left alone too. "wiener" applies, along the streamline through p on which
@@ -151,10 +160,11 @@ def deblur(
 
     References
     ----------
-    L. I. Rudin, S. Osher, E. Fatemi, Physica D 60 (1992) 259-268,
-    doi:10.1016/0167-2789(92)90242-F. W. H. Richardson, J. Opt. Soc. Am. 62 (1972)
-    55-59, doi:10.1364/JOSA.62.000055. B. R. Hunt, IEEE Trans. Computers C-22 (1973)
-    805-812, doi:10.1109/TC.1973.5009169. N. Levinson, J. Math. Phys. 25 (1946)
+    S. Lefkimmiatis, A. Roussos, P. Maragos, M. Unser, SIAM J. Imaging Sci. 8 (2015)
+    1090-1122, doi:10.1137/14098154X. L. I. Rudin, S. Osher, E. Fatemi, Physica D 60
+    (1992) 259-268, doi:10.1016/0167-2789(92)90242-F. W. H. Richardson, J. Opt. Soc. Am.
+    62 (1972) 55-59, doi:10.1364/JOSA.62.000055. B. R. Hunt, IEEE Trans. Computers C-22
+    (1973) 805-812, doi:10.1109/TC.1973.5009169. N. Levinson, J. Math. Phys. 25 (1946)
     261-278, doi:10.1002/sapm1946251261. C. Texin, MIT MEng thesis, 2007, section 4.2.
 
     Examples
@@ -205,6 +215,7 @@ def deblur(
             weights=weights,
             noise=noise,
             regularization=regularization,
+            tone=tone_of(gamma),
             progress=progress,
         )
     report = {

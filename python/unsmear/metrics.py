@@ -11,6 +11,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear._arrays import as_floating, as_flow, as_real_array
+from unsmear.reblur import reblur_error
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ __all__ = [
     "flow_errors",
     "magnitude_error",
     "psnr",
+    "reblur_error",
     "sparsification",
     "ssim",
 ]

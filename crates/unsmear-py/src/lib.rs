@@ -40,7 +40,7 @@ mod _unsmear {
     #[pymodule_export]
     use crate::interpolate::sample;
     #[pymodule_export]
-    use crate::metrics::{error_map, psnr, ssim};
+    use crate::metrics::{error_map, estimate_noise, psnr, ssim};
     #[pymodule_export]
     use crate::motion_deblur::{motion_deblur_f32, motion_deblur_f64};
     #[pymodule_export]

@@ -8,6 +8,7 @@ use unsmear::{FlowView, Result, metrics};
 
 use crate::arrays::flow_view;
 use crate::errors::to_python;
+use crate::threads;
 
 type ErrorMap = fn(FlowView<'_, f64>, FlowView<'_, f64>) -> Result<Array2<f64>>;
 
@@ -50,4 +51,18 @@ pub(crate) fn ssim(
     data_range: f64,
 ) -> PyResult<f64> {
     metrics::ssim(a.as_array(), b.as_array(), data_range).map_err(|e| to_python(&e))
+}
+
+/// See `unsmear.noise.estimate_noise`; one channel.
+#[pyfunction]
+pub(crate) fn estimate_noise(
+    py: Python<'_>,
+    image: PyReadonlyArray2<'_, f64>,
+    flow: PyReadonlyArray3<'_, f64>,
+    exposure: f64,
+) -> PyResult<f64> {
+    let (image, flow) = (image.as_array(), flow_view(&flow).map_err(|e| to_python(&e))?);
+    threads::run(py, None, |control| {
+        unsmear::noise::estimate_noise(&image, &flow, exposure, control)
+    })
 }

@@ -75,7 +75,7 @@ fn deblur<'py, T: Real + Element>(
 /// See `unsmear.deblur`, methods "tv", "fast", "tikhonov" and "richardson-lucy"; `float32`.
 #[pyfunction]
 #[pyo3(signature = (image, flow, method, exposure, *, acceleration=None, weights=None, noise=None,
-                    regularization=None, progress=None))]
+                    regularization=None, ceiling=None, progress=None))]
 pub(crate) fn motion_deblur_f32<'py>(
     py: Python<'py>,
     image: PyReadonlyArray3<'py, f32>,
@@ -86,16 +86,18 @@ pub(crate) fn motion_deblur_f32<'py>(
     weights: Option<PyReadonlyArray2<'py, f32>>,
     noise: Option<f64>,
     regularization: Option<f64>,
+    ceiling: Option<f64>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Outcome<'py, f32>> {
-    let method = MotionDeblur { method: method_called(method)?, exposure, noise, regularization };
+    let method =
+        MotionDeblur { method: method_called(method)?, exposure, noise, regularization, ceiling };
     deblur(py, &image, &flow, acceleration.as_ref(), weights.as_ref(), method, progress)
 }
 
 /// See `unsmear.deblur`, methods "tv", "fast", "tikhonov" and "richardson-lucy"; `float64`.
 #[pyfunction]
 #[pyo3(signature = (image, flow, method, exposure, *, acceleration=None, weights=None, noise=None,
-                    regularization=None, progress=None))]
+                    regularization=None, ceiling=None, progress=None))]
 pub(crate) fn motion_deblur_f64<'py>(
     py: Python<'py>,
     image: PyReadonlyArray3<'py, f64>,
@@ -106,8 +108,10 @@ pub(crate) fn motion_deblur_f64<'py>(
     weights: Option<PyReadonlyArray2<'py, f32>>,
     noise: Option<f64>,
     regularization: Option<f64>,
+    ceiling: Option<f64>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Outcome<'py, f64>> {
-    let method = MotionDeblur { method: method_called(method)?, exposure, noise, regularization };
+    let method =
+        MotionDeblur { method: method_called(method)?, exposure, noise, regularization, ceiling };
     deblur(py, &image, &flow, acceleration.as_ref(), weights.as_ref(), method, progress)
 }

@@ -2,10 +2,10 @@
 
 #![allow(clippy::needless_pass_by_value, reason = "PyO3 extracts arguments by value")]
 
-use ndarray::{Array3, ArrayView2, ArrayView3, Axis};
+use ndarray::{Array3, ArrayView3, Axis};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
-use unsmear::deblur::{Datum, occlusion_weights};
+use unsmear::deblur::occlusion_weights;
 use unsmear::linear_operator::LinearOperator;
 use unsmear::motion_operator::{MotionOperator, Taps};
 use unsmear::motion_path::MotionPaths;
@@ -34,6 +34,7 @@ pub(crate) struct Look<'py> {
     acceleration: Field<'py>,
     offset: Option<Field<'py>>,
     exposure: f64,
+    ceiling: Option<f32>,
 }
 
 impl Look<'_> {
@@ -63,41 +64,43 @@ pub(crate) fn looks_reach(looks: Vec<Look<'_>>) -> PyResult<usize> {
 
 /// The picture that all `looks` show, for each of `lambdas`, padded by `pad`; and the residuals.
 #[pyfunction]
-#[pyo3(signature = (looks, pad, lambdas, robust, first, following, start=None, progress=None))]
+#[pyo3(signature = (looks, pad, lambdas, noise, robust, first, following, sharp=false, start=None, progress=None))]
 pub(crate) fn restore_looks<'py>(
     py: Python<'py>,
     looks: Vec<Look<'py>>,
     pad: usize,
     lambdas: Vec<f64>,
+    noise: f64,
     robust: f64,
     first: (usize, usize),
     following: (usize, usize),
+    sharp: bool,
     start: Option<PyReadonlyArray3<'py, f32>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Vec<Planes<'py>>, Vec<f64>)> {
-    let walk = Walk { lambdas, robust, first, next: following };
+    let walk = Walk { lambdas, noise, robust, sharp, first, next: following };
     let paths = looks.iter().map(Look::paths).collect::<Result<Vec<_>>>();
     let paths = paths.map_err(|e| to_python(&e))?;
-    let recorded: Vec<(ArrayView3<'_, f32>, ArrayView2<'_, f32>)> =
-        looks.iter().map(|look| (look.planes.as_array(), look.weights.as_array())).collect();
+    let recorded: Vec<ArrayView3<'_, f32>> =
+        looks.iter().map(|look| look.planes.as_array()).collect();
+    let pictures: Vec<_> = looks
+        .iter()
+        .zip(paths)
+        .zip(&recorded)
+        .map(|((look, paths), planes)| unsmear::deblur::Look {
+            paths,
+            planes: planes.outer_iter().collect(),
+            weights: look.weights.as_array().to_owned(),
+            ceiling: look.ceiling,
+        })
+        .collect();
     let start = start.as_ref().map(|start| {
         start.as_array().outer_iter().map(|plane| plane.iter().copied().collect()).collect()
     });
     let solutions = run(py, progress, |control: &Control| {
-        let operators = paths
-            .iter()
-            .map(|paths| MotionOperator::new(paths, Taps::Cubic, pad))
-            .collect::<Result<Vec<_>>>()?;
-        let data = operators
-            .iter()
-            .zip(&recorded)
-            .map(|(operator, (planes, weights))| {
-                let planes: Vec<_> = planes.outer_iter().collect();
-                Datum::new(operator, &planes, Some(weights.view()))
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let shape = operators.first().map_or((0, 0), LinearOperator::unknown_shape);
-        let solutions = walk.restore(&data, start, control)?;
+        let (height, width) = pictures.first().map_or((0, 0), |look| look.paths.dim());
+        let shape = (height + 2 * pad, width + 2 * pad);
+        let solutions = walk.restore(&pictures, pad, start, control)?;
         let unpacked = solutions
             .into_iter()
             .map(|solution| Ok((packed(shape, solution.channels)?, solution.residual)));
@@ -144,7 +147,8 @@ pub(crate) fn frame_motion<'py>(
     backward: Option<Field<'py>>,
     acceleration: Option<Field<'py>>,
 ) -> PyResult<(Planes<'py>, Planes<'py>)> {
-    let fields = [forward, backward, acceleration].map(|field| field.as_ref().map(owned).transpose());
+    let fields =
+        [forward, backward, acceleration].map(|field| field.as_ref().map(owned).transpose());
     let motion = run(py, None, |control: &Control| {
         let [forward, backward, acceleration] = fields;
         let (forward, backward, acceleration) = (forward?, backward?, acceleration?);
@@ -162,8 +166,7 @@ pub(crate) fn visibility<'py>(
     exposure: f64,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let velocity = owned(&velocity).map_err(|e| to_python(&e))?;
-    let weights =
-        run(py, None, |control| occlusion_weights(&velocity.view(), exposure, control))?;
+    let weights = run(py, None, |control| occlusion_weights(&velocity, exposure, control))?;
     Ok(weights.into_pyarray(py))
 }
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import html
 import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from unsmear import plot
 from unsmear._atomic import write_bytes_atomic
+from unsmear._plain_data import plain_data
 from unsmear._progress import ProgressBar
 from unsmear.cli import _common
 from unsmear.deblur import METHODS, deblur
@@ -69,12 +70,12 @@ def run(options: argparse.Namespace) -> None:
     frames = _common.frames_of(options)
     with ProgressBar("deblur") as bar:
         if options.method == AUTOMATIC and not options.flow:
-            restored, reports = _whole_chain(options, frames, bar)
+            restored, flows, reports = _whole_chain(options, frames, bar)
         else:
-            restored, reports = _frame_by_frame(options, frames, bar)
+            restored, flows, reports = _frame_by_frame(options, frames, bar)
     write_frames(options.output, restored)
     if options.report:
-        _write_report(options.report, reports)
+        _write_report(options.report, frames, restored, flows, reports)
     warnings = {text for report in reports for text in report.get("warnings", [])}
     result: dict[str, Any] = {
         "frames": len(frames),
@@ -97,7 +98,7 @@ def _exposure(text: str) -> float | str:
 
 def _whole_chain(
     options: argparse.Namespace, frames: NDArray[Any], bar: ProgressBar
-) -> tuple[NDArray[Any], list[dict[str, Any]]]:
+) -> tuple[NDArray[Any], list[NDArray[np.float32]], list[dict[str, Any]]]:
     if len(frames) < 2:
         msg = "one frame alone shows no motion: give more frames, or --flow"
         raise ValueError(msg)
@@ -118,18 +119,19 @@ def _whole_chain(
         progress=bar,
         **_common.parameters_of(options),
     )
-    return result.frames, result.reports
+    return result.frames, list(result.flows), result.reports
 
 
 def _frame_by_frame(
     options: argparse.Namespace, frames: NDArray[Any], bar: ProgressBar
-) -> tuple[NDArray[Any], list[dict[str, Any]]]:
-    restored, reports = [], []
+) -> tuple[NDArray[Any], list[NDArray[np.float32]], list[dict[str, Any]]]:
+    restored, flows, reports = [], [], []
     method = "tv" if options.method == AUTOMATIC else options.method
     for index, frame in enumerate(frames):
+        flows.append(_flow_of(options, frames, index))
         result = deblur(
             frame,
-            _flow_of(options, frames, index),
+            flows[-1],
             exposure=options.exposure,
             method=method,
             noise=options.noise,
@@ -138,7 +140,7 @@ def _frame_by_frame(
         restored.append(result.image)
         reports.append(result.report)
         bar((index + 1) / len(frames))
-    return np.stack(restored), reports
+    return np.stack(restored), flows, reports
 
 
 def _flow_of(
@@ -159,37 +161,30 @@ def _flow_of(
     return velocity
 
 
-COLUMNS = {
-    "verdict": "verdict",
-    "exposure": "exposure (frames)",
-    "exposure_status": "trust in it",
-    "blur_px": "blur (px)",
-    "noise": "noise",
-    "expected_gain_db": "expected gain (dB)",
-    "ringing_risk": "risk of ringing",
-}
-
-
-def _write_report(path: str, reports: list[dict[str, Any]]) -> None:
-    """Write the reports: all of them as JSON, or the main figures as a page."""
+def _write_report(
+    path: str,
+    frames: NDArray[Any],
+    restored: NDArray[Any],
+    flows: list[NDArray[np.float32]],
+    reports: list[dict[str, Any]],
+) -> None:
+    """Write the reports: all of them as JSON, or a page to look at."""
     if path.endswith(".json"):
-        text = json.dumps(reports, indent=2, allow_nan=False)
-    else:
-        head = "".join(f"<th>{name}</th>" for name in ("frame", *COLUMNS.values()))
-        rows = []
-        for number, report in enumerate(reports):
-            cells = [str(number), *(_cell(report.get(name)) for name in COLUMNS)]
-            line = "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
-            rows.append(f"<tr>{line}</tr>")
-        text = (
-            "<!DOCTYPE html>\n<meta charset='utf-8'>\n<title>unsmear deblur</title>\n"
-            "<style>td, th { padding: 0 1em; text-align: left }</style>\n"
-            f"<table>\n<tr>{head}</tr>\n" + "\n".join(rows) + "\n</table>\n"
-        )
-    write_bytes_atomic(path, text.encode())
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return "unknown"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+        text = json.dumps(plain_data(reports), indent=2, allow_nan=False)
+        write_bytes_atomic(path, text.encode())
+        return
+    plot.report(
+        path,
+        frames,
+        restored=restored,
+        flows=flows,
+        exposure=float(np.mean([report["exposure"] for report in reports])),
+        verdicts=[
+            f"frame {number}: {text}"
+            for number, report in enumerate(reports)
+            for text in (report.get("verdict"), *report.get("warnings", ()))
+            if text
+        ],
+        parameters={"frames": plain_data(reports)},
+        title="unsmear deblur",
+    )

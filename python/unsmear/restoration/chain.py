@@ -139,7 +139,7 @@ class Chain:
 
     def _twin(self, index: int) -> Plane:
         pictures, pad = self._walk(index)
-        return cropped(pictures[TWIN], pad)[0]
+        return np.asarray(cropped(pictures[TWIN], pad)[0])
 
     def _twins(self, index: int) -> Twins:
         return self._memo.get("twins", index, lambda: self._find_twins(index))

@@ -24,7 +24,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.flow import optical_flow
-from unsmear.restoration.sampling import composed, pulled_field, smoothed
+from unsmear.restoration.sampling import composed, inside, pulled_field, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ClipMotion", "Motion"]
 
+LEAST_RETURN, RELATIVE_RETURN = 1.0, 0.1
+"""Of the way there and back, px, and as a share of the way: farther is hidden."""
 SMOOTHING = 8.0
 LEAST_KNOWN = 1e-3
 GREATEST_CORRECTION = 0.6
@@ -121,14 +123,36 @@ class ClipMotion:
             neighbour = index + (1 if forward is not None else -1)
             assert way is not None, "a frame of a clip has a neighbour"
             given = pulled_field(self.motion(neighbour).acceleration, way)
-        velocity, acceleration = _unsmear.frame_motion(forward, backward, given)
+        one = self._believed(index, index + 1, forward)
+        back = self._believed(index, index - 1, backward)
+        velocity, acceleration = _unsmear.frame_motion(one, back, given)
+        every, _ = _unsmear.frame_motion(forward, backward, given)
+        velocity = np.where(np.isnan(velocity), every, velocity)
         if forward is not None and backward is not None:
             after = self.flow(index + 1, index + 2)
             before = self.flow(index - 1, index - 2)
-            change, bend = _third_order(forward, backward, after, before)
+            assert one is not None, "a flow there is, believed or not"
+            assert back is not None, "a flow there is, believed or not"
+            change, bend = _third_order(one, back, after, before)
             velocity = velocity + _carried_on(change, velocity)
             acceleration = acceleration + _carried_on(bend, velocity)
         return Motion(velocity, acceleration, forward, backward)
+
+    def _believed(self, index: int, other: int, way: Field | None) -> Field | None:
+        """Return a flow, NaN where the way there and back does not end at its start.
+
+        What is hidden in the other frame has no motion to it.
+        """
+        if way is None:
+            return None
+        back = self.flow(other, index)
+        assert back is not None, "a flow has its way back"
+        error = np.linalg.norm(composed(way, back), axis=-1)
+        tolerance = LEAST_RETURN + RELATIVE_RETURN * np.linalg.norm(way, axis=-1)
+        believed = error < tolerance
+        # Off the picture nothing contradicts.
+        believed |= ~inside(way)
+        return np.where(believed[..., np.newaxis], way, np.float32(np.nan))
 
 
 def _third_order(
@@ -137,15 +161,15 @@ def _third_order(
     """Return the corrections of velocity and acceleration; NaN where not known."""
     two = None if after is None else composed(one, after)
     back_two = None if before is None else composed(back, before)
-    none = np.zeros_like(one)
+    change, bend = np.zeros_like(one), np.zeros_like(one)
     if two is not None and back_two is not None:
-        change = (2 * (one - back) - (two - back_two)) / 12
-        return change, (4 * (one + back) - (two + back_two)) / 12
-    if two is not None:
-        return (3 * one + back - two) / 6, none
-    if back_two is not None:
-        return -(3 * back + one - back_two) / 6, none
-    return none, none
+        change[:] = (2 * (one - back) - (two - back_two)) / 12
+        bend[:] = (4 * (one + back) - (two + back_two)) / 12
+    elif two is not None:
+        change[:] = (3 * one + back - two) / 6
+    elif back_two is not None:
+        change[:] = (back_two - 3 * back - one) / 6
+    return change, bend
 
 
 def _carried_on(correction: Field, velocity: Field) -> Field:

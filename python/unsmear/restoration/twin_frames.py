@@ -15,6 +15,7 @@ to it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -105,15 +106,15 @@ def choose_strength(
     The twins themselves are smooth, which favours smoothness: hence the least. Never
     below half of what the noise alone asks for.
     """
-    floor = LEAST_STRENGTH * float(noise) ** 1.5
+    floor = LEAST_STRENGTH * math.sqrt(noise) ** 3
     best = min(scores)
-    if not np.isfinite(best):
-        return max((strengths[0] * strengths[1]) ** 0.5, floor)
+    if not math.isfinite(best):
+        return max(math.sqrt(strengths[0] * strengths[1]), floor)
     limit = TOLERANCE * best
     first = next(k for k, value in enumerate(scores) if value <= limit)
     if first == 0:
         return max(strengths[0], floor)
     before, at = scores[first - 1], scores[first]
     share = (before - limit) / (before - at)
-    step = strengths[first] / strengths[first - 1]
-    return max(strengths[first - 1] * step**share, floor)
+    step = math.log(strengths[first] / strengths[first - 1])
+    return max(strengths[first - 1] * math.exp(share * step), floor)

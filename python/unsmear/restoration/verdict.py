@@ -12,8 +12,8 @@ blurred frame are left out softly,
 
     local(p) = sqrt((G e_x + k E_x) / (G e_b + k E_b)),
 
-G a Gaussian of 12 px, E the region's means. What blurs by less than 1/2 px is returned
-as it came, bit for bit, fading in up to 1 px.
+G a Gaussian of 12 px, E the region's means. What blurs by less than 0.3 px is returned
+as it came, bit for bit, fading in up to 0.6 px.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Verdict", "judge"]
 
-LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.06, "unsure": 0.98}
+LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.1, "unsure": 0.98}
 LOCAL_SMOOTHING = 12.0
 REGION_SHARE = 0.5
 LOCAL_LIMIT = (1.15, 1.3)
-STILL, FULL = 0.5, 1.0
+STILL, FULL = 0.3, 0.6
 SMALLEST_REGION = 64
 LOW_RISK, HIGH_RISK = 0.85, 1.0
 

@@ -10,7 +10,7 @@
 
 use super::datum::Datum;
 use super::smoothness::Smoothness;
-use super::vectors::{add, direction, dot, scale_by, step, weighted_difference};
+use super::vectors::{add, direction, dot, step, weighted_difference};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -103,12 +103,10 @@ impl NormalEquations<'_> {
         let Scratch { direction, product, share, blurred, .. } = scratch;
         for (i, (datum, weights)) in self.data.iter().zip(self.weights).enumerate() {
             let blurred = &mut blurred[..weights.len()];
-            datum.operator().apply(direction, blurred);
-            scale_by(blurred, weights);
             if i == 0 {
-                datum.operator().adjoint(blurred, product);
+                datum.operator().normal(direction, weights, blurred, product);
             } else {
-                datum.operator().adjoint(blurred, share);
+                datum.operator().normal(direction, weights, blurred, share);
                 add(product, share);
             }
         }
@@ -120,6 +118,7 @@ impl NormalEquations<'_> {
 mod tests {
     use super::*;
     use crate::kernel_operator::KernelOperator;
+    use crate::linear_operator::LinearOperator;
     use ndarray::Array2;
 
     #[test]

@@ -16,6 +16,7 @@ pub struct Datum<'a> {
     operator: &'a dyn LinearOperator,
     planes: Vec<Vec<f32>>,
     weights: Vec<f32>,
+    ceiling: f32,
 }
 
 impl<'a> Datum<'a> {
@@ -53,7 +54,19 @@ impl<'a> Datum<'a> {
                 planes.iter_mut().for_each(|plane| plane[i] = 0.0);
             }
         }
-        Ok(Self { operator, planes, weights })
+        Ok(Self { operator, planes, weights, ceiling: f32::INFINITY })
+    }
+
+    /// Samples of at least `ceiling` were clipped: there the picture is that bright or brighter.
+    #[must_use]
+    pub fn with_ceiling(self, ceiling: f32) -> Self {
+        Self { ceiling, ..self }
+    }
+
+    /// Least value of a clipped sample; infinite when there are none.
+    #[must_use]
+    pub fn ceiling(&self) -> f32 {
+        self.ceiling
     }
 
     /// The operator A.
@@ -118,7 +131,7 @@ pub(super) fn first_guess(datum: &Datum<'_>) -> Vec<Vec<f32>> {
     datum.planes().iter().map(guess).collect()
 }
 
-/// Root mean square of A x - b over the believed samples inside a margin; NaN if there are none.
+/// Root mean square of A x - b over the believed samples, clipped ones apart, inside a margin; NaN if there are none.
 pub(super) fn residual_rms(data: &[Datum<'_>], channels: &[Vec<f32>], blurred: &mut [f32]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for datum in data {
@@ -130,8 +143,8 @@ pub(super) fn residual_rms(data: &[Datum<'_>], channels: &[Vec<f32>], blurred: &
             for y in margin..height - margin {
                 let inside = y * width + margin..(y + 1) * width - margin;
                 let weights = &datum.weights()[inside.clone()];
-                for ((a, b), &w) in blurred[inside.clone()].iter().zip(&plane[inside]).zip(weights)
-                {
+                let samples = blurred[inside.clone()].iter().zip(&plane[inside]).zip(weights);
+                for ((a, &b), &w) in samples.filter(|((_, b), _)| **b < datum.ceiling) {
                     sum += f64::from(w) * f64::from(a - b).powi(2);
                     count += f64::from(w);
                 }

@@ -16,6 +16,8 @@ pub struct Look<'a> {
     pub planes: Vec<ArrayView2<'a, f32>>,
     /// How far each sample is believed, in [0, 1]; 0 for unknown samples and unknown motion.
     pub weights: Array2<f32>,
+    /// Least value of a clipped sample, grey levels; None: none is clipped.
+    pub ceiling: Option<f32>,
 }
 
 /// The operators of all looks, padded alike.
@@ -31,7 +33,8 @@ pub(super) fn data<'a>(
     operators: &'a [MotionOperator],
 ) -> Result<Vec<Datum<'a>>> {
     let datum = |(look, operator): (&Look<'_>, &'a MotionOperator)| {
-        Datum::new(operator, &look.planes, Some(look.weights.view()))
+        let datum = Datum::new(operator, &look.planes, Some(look.weights.view()))?;
+        Ok(datum.with_ceiling(look.ceiling.unwrap_or(f32::INFINITY)))
     };
     looks.iter().zip(operators).map(datum).collect()
 }

@@ -57,6 +57,8 @@ pub struct MotionDeblur {
     pub noise: Option<f64>,
     /// Weight lambda of the prior, > 0, in the picture's units (Tikhonov: without unit); None: from noise and residual.
     pub regularization: Option<f64>,
+    /// Least value of a clipped sample, in the picture's units; None: none is clipped.
+    pub ceiling: Option<f64>,
 }
 
 /// What came, of the shape (H, W) all.
@@ -138,7 +140,8 @@ impl MotionDeblur {
         let acceleration = blurred.acceleration.as_ref().map(single).transpose()?;
         let paths = MotionPaths::new(&flow, self.exposure, acceleration.as_ref())?;
         let planes = planes.iter().map(|plane| plane.view()).collect();
-        let look = Look { paths, planes, weights: weights.used };
+        let ceiling = self.ceiling.map(|value| levels.grey(value) as f32);
+        let look = Look { paths, planes, weights: weights.used, ceiling };
         let restored = self.solve(&look, noise, levels.scale(), control)?;
         let seen = if weights.unknown { Some(seen(&look, restored.pad)?) } else { None };
         compose(&mut result.images, &restored, &lengths, &levels, seen.as_ref());

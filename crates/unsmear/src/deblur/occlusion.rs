@@ -8,7 +8,7 @@
 //! w(p) = 0  where, for some t in (0, 0.55],  |v(p - t V) + v(p + t V) - 2 v(p)| > max(1 px/frame, 0.2 |v(p)|)
 //! ```
 //!
-//! with V = e v(p) the path in px, samples to the nearest pixel and no further apart than 1 px; else w(p) = 1. A sample
+//! with V = e v(p) the path in px, samples at the nearest pixels and 2 px apart; else w(p) = 1. A sample
 //! of unknown motion or beyond the picture says nothing. Own unknown motion: w = 0. Validity: jumps of 1 px/frame and
 //! above; a boundary smoothed over more than the path is not seen.
 
@@ -17,36 +17,40 @@ use ndarray::Array2;
 use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::{Result, require};
-use crate::flow_field::FlowView;
-use crate::real::Real;
+use crate::flow_field::FlowField;
 
 /// Half the path that is searched, as a share of it: a little beyond its ends, where the boundary's own blur begins.
-const HALF_PATH: f64 = 0.55;
+const HALF_PATH: f32 = 0.55;
 
 /// Least jump that counts, px/frame.
-const LEAST_JUMP: f64 = 1.0;
+const LEAST_JUMP: f32 = 1.0;
 
 /// Least jump that counts as a share of the speed: estimated flow errs by about that near its boundaries.
-const RELATIVE_JUMP: f64 = 0.2;
+const RELATIVE_JUMP: f32 = 0.2;
+
+/// Distance between samples, px: nothing wider is missed.
+const SPACING: f32 = 2.0;
 
 /// Most samples on half a path.
-const MOST_SAMPLES: f64 = 64.0;
+const MOST_SAMPLES: f32 = 64.0;
 
 /// Weights (H, W), 0 or 1, of data blurred by `flow` times `exposure`; see the [module](self).
 ///
 /// # Errors
 /// [`Error::Value`](crate::Error::Value) when `exposure` is not positive; [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn occlusion_weights<T: Real>(
-    flow: &FlowView<'_, T>,
+pub fn occlusion_weights(
+    flow: &FlowField<f32>,
     exposure: f64,
     control: &Control,
 ) -> Result<Array2<f32>> {
     require("exposure", exposure, "finite and positive", |e| e > 0.0)?;
     let (height, width) = flow.dim();
+    let packed: Vec<[f32; 2]> = flow.u.iter().zip(&flow.v).map(|(&u, &v)| [u, v]).collect();
     let mut weights = vec![1.0; height * width];
+    let half = HALF_PATH * exposure as f32;
     for_each_row(&mut weights, width, control, |y, row| {
         for (x, weight) in row.iter_mut().enumerate() {
-            if crosses_a_jump(flow, exposure, y, x) {
+            if crosses_a_jump(&packed, width, half, y, x) {
                 *weight = 0.0;
             }
         }
@@ -54,45 +58,45 @@ pub fn occlusion_weights<T: Real>(
     Ok(Array2::from_shape_fn((height, width), |(y, x)| weights[y * width + x]))
 }
 
-fn crosses_a_jump<T: Real>(flow: &FlowView<'_, T>, exposure: f64, y: usize, x: usize) -> bool {
-    let at = |y, x| flow.at(y, x).map(T::as_f64);
-    let [u, v] = at(y, x);
-    let speed = u.hypot(v);
-    if !speed.is_finite() {
+/// Whether the path of a pixel, `half` frames to either side, meets a jump, or its motion is unknown.
+fn crosses_a_jump(flow: &[[f32; 2]], width: usize, half: f32, y: usize, x: usize) -> bool {
+    let [u, v] = flow[y * width + x];
+    let square = u * u + v * v;
+    if !square.is_finite() {
         return true;
     }
-    let (height, width) = flow.dim();
-    let nearest = |t: f64| {
-        let row = (y as f64 + t * v).round();
-        let column = (x as f64 + t * u).round();
-        let inside = row >= 0.0 && column >= 0.0 && row < height as f64 && column < width as f64;
-        inside.then(|| at(row as usize, column as usize))
-    };
-    let half = HALF_PATH * exposure;
-    let samples = (half * speed).ceil().min(MOST_SAMPLES);
+    let (columns, rows) = (width as f32, (flow.len() / width) as f32);
+    let (middle_x, middle_y) = (x as f32 + 0.5, y as f32 + 0.5);
+    let speed = square.sqrt();
+    let samples = (half * speed / SPACING + 1.0).min(MOST_SAMPLES) as usize;
     let allowed = LEAST_JUMP.max(RELATIVE_JUMP * speed);
-    (1..=samples as usize).any(|k| {
-        let t = half * k as f64 / samples;
-        let (Some(ahead), Some(behind)) = (nearest(-t), nearest(t)) else { return false };
-        (ahead[0] + behind[0] - 2.0 * u).hypot(ahead[1] + behind[1] - 2.0 * v) > allowed
+    (1..=samples).any(|k| {
+        let t = half * k as f32 / samples as f32;
+        let at = |t: f32| {
+            let (column, row) = (middle_x + t * u, middle_y + t * v);
+            let inside = column >= 0.0 && row >= 0.0 && column < columns && row < rows;
+            inside.then(|| flow[row as usize * width + column as usize])
+        };
+        let (Some(ahead), Some(behind)) = (at(-t), at(t)) else { return false };
+        let (du, dv) = (ahead[0] + behind[0] - 2.0 * u, ahead[1] + behind[1] - 2.0 * v);
+        du * du + dv * dv > allowed * allowed
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow_field::FlowField;
 
-    fn weights(flow: impl Fn(usize, usize) -> [f64; 2]) -> Array2<f32> {
+    fn weights(flow: impl Fn(usize, usize) -> [f32; 2]) -> Array2<f32> {
         let part = |i: usize| Array2::from_shape_fn((40, 60), |(y, x)| flow(y, x)[i]);
         let field = FlowField::new(part(0), part(1)).unwrap();
-        occlusion_weights(&field.view(), 1.0, &Control::new()).unwrap()
+        occlusion_weights(&field, 1.0, &Control::new()).unwrap()
     }
 
     #[test]
     fn smooth_fields_are_believed() {
         // Rotation by 25 degrees, 11 px/frame at the corners: affine.
-        let turn = weights(|y, x| [0.436 * (y as f64 - 20.0), -0.436 * (x as f64 - 30.0)]);
+        let turn = weights(|y, x| [0.436 * (y as f32 - 20.0), -0.436 * (x as f32 - 30.0)]);
         assert!(turn.iter().all(|&w| w == 1.0));
     }
 
@@ -104,7 +108,7 @@ mod tests {
             let expected = if (30..34).contains(&x) { 0.0 } else { 1.0 };
             assert_eq!(two[(20, x)], expected, "{x}");
         }
-        let unknown = weights(|_, x| if x == 7 { [f64::NAN, 0.0] } else { [4.0, 0.0] });
+        let unknown = weights(|_, x| if x == 7 { [f32::NAN, 0.0] } else { [4.0, 0.0] });
         assert!((0..60).all(|x| unknown[(3, x)] == if x == 7 { 0.0 } else { 1.0 }));
     }
 }

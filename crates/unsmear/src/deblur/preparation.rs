@@ -70,7 +70,7 @@ impl Weights {
         exposure: f64,
         control: &Control,
     ) -> Result<Self> {
-        let mut used = occlusion_weights(&flow.view(), exposure, control)?;
+        let mut used = occlusion_weights(flow, exposure, control)?;
         let moving = |u: f32, v: f32| !(u + v).is_nan();
         let mut occluded = 0;
         Zip::from(&used).and(&flow.u).and(&flow.v).for_each(|&w, &u, &v| {

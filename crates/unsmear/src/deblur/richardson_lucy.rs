@@ -59,11 +59,11 @@ impl RichardsonLucy {
         let lifted: Vec<_> = look.planes.iter().map(|plane| plane.map(|s| s - black)).collect();
         let planes = lifted.iter().map(|plane| plane.view()).collect();
         let (paths, weights) = (look.paths.clone(), look.weights.clone());
-        let looks = [Look { paths, planes, weights }];
+        let looks = [Look { paths, planes, weights, ceiling: None }];
         let (operators, pad) = operators(&looks, Taps::Linear)?;
         let mut solution = self.solve(&data(&looks, &operators)?, control)?;
         solution.channels.iter_mut().flatten().for_each(|x| *x += black);
-        let mismatch = solution.residual / self.noise;
+        let mismatch = f64::NAN;
         Ok(Restored { solution, pad, lambda: f64::NAN, mismatch })
     }
 

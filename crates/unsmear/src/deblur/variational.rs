@@ -7,7 +7,7 @@
 //!
 //! R is the prior of `structure.rs`. Each turn replaces both terms by quadratic forms that touch them at the present x
 //! and takes some conjugate-gradient steps on their sum. All looks share x; channels share the weights of the data
-//! (r^2 is their mean square) and of the prior. Padding pixels are unknowns like all others. Units: grey levels.
+//! (r^2 is their mean square) and of the prior. A clipped sample counts only while A x is below it. Padding pixels are unknowns like all others. Units: grey levels.
 //!
 //! P. W. Holland & R. E. Welsch, Commun. Stat. A 6 (1977) 813-827,
 //! [10.1080/03610927708827533](https://doi.org/10.1080/03610927708827533), for the reweighting.
@@ -74,8 +74,9 @@ impl Variational {
                     let Scratch { residual, direction, product, .. } = &mut scratch;
                     prior.renew(&channels, &mut smoothness, [residual, direction, product]);
                 }
-                if let Some(scale) = self.robust {
-                    reweight(data, &channels, scale, &mut weights, &mut scratch);
+                let clipped = data.iter().any(|datum| datum.ceiling().is_finite());
+                if self.robust.is_some() || clipped {
+                    reweight(data, &channels, self.robust, &mut weights, &mut scratch);
                 }
             }
             for (channel, x) in channels.iter_mut().enumerate() {
@@ -112,27 +113,29 @@ impl Variational {
     }
 }
 
-/// Given weights times Cauchy's, from the residuals of all channels.
+/// Given weights times Cauchy's, from the residuals of all channels; 0 where a clipped sample is explained by any
+/// picture as bright as this one.
 fn reweight(
     data: &[Datum<'_>],
     channels: &[Vec<f32>],
-    scale: f64,
+    scale: Option<f64>,
     weights: &mut [Vec<f32>],
     scratch: &mut Scratch,
 ) {
-    let share = (1.0 / (scale * scale * channels.len() as f64)) as f32;
+    let share = scale.map_or(0.0, |c| (1.0 / (c * c * channels.len() as f64)) as f32);
     for (datum, weights) in data.iter().zip(weights) {
         // First the sum of squares, then the weight.
         weights.fill(0.0);
         let blurred = &mut scratch.blurred[..weights.len()];
         for (x, plane) in channels.iter().zip(datum.planes()) {
             datum.operator().apply(x, blurred);
-            for (sum, (a, b)) in weights.iter_mut().zip(blurred.iter().zip(plane)) {
-                *sum += (a - b) * (a - b);
+            for (sum, (&a, &b)) in weights.iter_mut().zip(blurred.iter().zip(plane)) {
+                let clipped = b >= datum.ceiling() && a >= b;
+                *sum += if clipped { f32::INFINITY } else { share * (a - b) * (a - b) };
             }
         }
         for (weight, given) in weights.iter_mut().zip(datum.weights()) {
-            *weight = given / (1.0 + share * *weight);
+            *weight = given / (1.0 + *weight);
         }
     }
 }
@@ -140,7 +143,9 @@ fn reweight(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deblur::structure::Power;
     use crate::kernel_operator::KernelOperator;
+    use crate::linear_operator::LinearOperator;
     use ndarray::{Array2, ArrayView2};
 
     const SHAPE: (usize, usize) = (24, 30);
@@ -165,15 +170,16 @@ mod tests {
     }
 
     fn method() -> Variational {
-        let prior = Some(Prior { rounding: 0.1, structure: false });
-        Variational { lambda: 0.02, prior, robust: None, turns: 8, steps: 15 }
+        let prior = Some(Prior { rounding: 0.5, power: Power::One });
+        Variational { lambda: 0.1, prior, robust: None, turns: 8, steps: 15 }
     }
 
-    /// Worst error over the data's own pixels, 4 px from their edge.
-    fn worst(operator: &KernelOperator, channel: &[f32]) -> f32 {
+    /// Root mean square error over the data's own pixels, 4 px from their edge.
+    fn error(operator: &KernelOperator, channel: &[f32]) -> f32 {
         let (sharp, columns) = (blocks(operator), operator.unknown_shape().1);
         let inside = (10..26).flat_map(|y| (10..32).map(move |x| y * columns + x));
-        inside.map(|i| (sharp[i] - channel[i]).abs()).fold(0.0, f32::max)
+        let sum: f32 = inside.map(|i| (sharp[i] - channel[i]).powi(2)).sum();
+        (sum / (16.0 * 22.0)).sqrt()
     }
 
     #[test]
@@ -182,37 +188,41 @@ mod tests {
         let planes = [blurred(&operator)];
         let data = [Datum::new(&operator, &planes.each_ref().map(|p| p.view()), None).unwrap()];
         let found = method().solve(&data, None, &Control::new()).unwrap();
-        // Total variation lowers a block of 8 px by lambda over half of that.
-        assert!(
-            worst(&operator, &found.channels[0]) < 0.5,
-            "{}",
-            worst(&operator, &found.channels[0])
-        );
-        assert!(found.residual < 0.05 && found.steps == 120);
-        // Two looks: what one box cannot see the other does. An empty third one changes nothing.
+        // The blurred edges err by 13 in the mean square; the prior lowers corners by a few levels.
+        assert!(error(&operator, &found.channels[0]) < 1.5, "{found:?}");
+        assert!(found.residual < 0.2 && found.steps == 120);
         let other = box_of(3);
-        let more = [
+        let both = [
             Datum::new(&operator, &[planes[0].view()], None).unwrap(),
             Datum::new(&other, &[blurred(&other).view()], None).unwrap(),
         ];
-        let joint = method().solve(&more, None, &Control::new()).unwrap();
-        assert!(worst(&operator, &joint.channels[0]) < worst(&operator, &found.channels[0]));
+        let joint = method().solve(&both, None, &Control::new()).unwrap();
+        assert!(error(&operator, &joint.channels[0]) < 0.8 * error(&operator, &found.channels[0]));
     }
 
     #[test]
-    fn an_outlier_is_not_believed_and_an_unknown_sample_not_missed() {
+    fn outliers_are_not_believed_and_unknown_or_clipped_samples_not_missed() {
         let operator = box_of(5);
-        let mut plane = blurred(&operator);
+        let clean = blurred(&operator);
+        let mut plane = clean.clone();
         plane[(12, 15)] += 200.0;
-        let solve = |plane: ArrayView2<'_, f32>, robust| {
-            let data = [Datum::new(&operator, &[plane], None).unwrap()];
-            let method = Variational { robust, ..method() };
-            worst(&operator, &method.solve(&data, None, &Control::new()).unwrap().channels[0])
+        let solve = |plane: ArrayView2<'_, f32>, robust, ceiling| {
+            let datum = Datum::new(&operator, &[plane], None).unwrap().with_ceiling(ceiling);
+            let method = Variational { lambda: 1.0, robust, ..method() };
+            let found = method.solve(&[datum], None, &Control::new()).unwrap();
+            error(&operator, &found.channels[0])
         };
-        let (fooled, robust) = (solve(plane.view(), None), solve(plane.view(), Some(2.0)));
-        assert!(robust < 2.0 && fooled > 20.0, "{robust} {fooled}");
+        let none = f32::INFINITY;
+        let best = solve(clean.view(), None, none);
+        let (fooled, robust) =
+            (solve(plane.view(), None, none), solve(plane.view(), Some(3.0), none));
+        assert!(robust < 0.8 * fooled && fooled > 2.0 * best, "{best} {robust} {fooled}");
         plane[(12, 15)] = f32::NAN;
-        assert!(solve(plane.view(), None) < 1.0);
+        assert!(solve(plane.view(), None, none) < 1.5 * best);
+        let clipped = clean.mapv(|s| s.min(35.0));
+        let (fooled, known) =
+            (solve(clipped.view(), None, none), solve(clipped.view(), None, 35.0));
+        assert!(known < 0.8 * fooled, "{known} {fooled}");
     }
 
     #[test]
@@ -227,9 +237,10 @@ mod tests {
         };
         let grey = run(1, 1);
         assert_eq!(grey, run(1, 3));
-        // The mean over channels of equal products rounds differently from the product.
+        // The mean over channels of equal products rounds differently from the product, which a prior that is
+        // not convex may amplify.
         for channel in run(3, 2).channels {
-            assert!(channel.iter().zip(&grey.channels[0]).all(|(a, b)| (a - b).abs() < 0.02));
+            assert!(channel.iter().zip(&grey.channels[0]).all(|(a, b)| (a - b).abs() < 0.5));
         }
     }
 

@@ -41,12 +41,7 @@ pub(super) fn direction(p: &mut [f32], r: &[f32], beta: f32) {
 
 /// `a + b` into a.
 pub(super) fn add(a: &mut [f32], b: &[f32]) {
-    a.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(a, b)| block_direction_of(a, b));
-}
-
-/// `w a` into a.
-pub(super) fn scale_by(a: &mut [f32], w: &[f32]) {
-    a.par_chunks_mut(BLOCK).zip(w.par_chunks(BLOCK)).for_each(|(a, w)| block_scale(a, w));
+    a.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(a, b)| block_add(a, b));
 }
 
 /// `w (b - a)` into a.
@@ -108,18 +103,10 @@ fn block_direction(p: &mut [f32], r: &[f32], beta: f32) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn block_direction_of(a: &mut [f32], b: &[f32]) {
+fn block_add(a: &mut [f32], b: &[f32]) {
     let b = &b[..a.len()];
     for i in 0..a.len() {
         a[i] += b[i];
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn block_scale(a: &mut [f32], w: &[f32]) {
-    let w = &w[..a.len()];
-    for i in 0..a.len() {
-        a[i] *= w[i];
     }
 }
 
@@ -164,8 +151,7 @@ mod tests {
         weighted_difference(&mut out, &b, &w);
         assert!((0..100).all(|i| out[i] == w[i] * (b[i] - a[i])));
         out.clone_from(&a);
-        scale_by(&mut out, &w);
         add(&mut out, &b);
-        assert!((0..100).all(|i| out[i] == a[i] * w[i] + b[i]));
+        assert!((0..100).all(|i| out[i] == a[i] + b[i]));
     }
 }

@@ -111,7 +111,8 @@ mod tests {
     fn a_parabola_gives_its_velocity_and_acceleration() {
         let (f, g) = (field(5.0 + 1.0, -2.0 - 0.5), field(-5.0 + 1.0, 2.0 - 0.5));
         let motion = frame_motion(Some(&f), Some(&g), None, &Control::new()).unwrap();
-        let close = |plane: &Array2<f32>, value: f32| plane.iter().all(|z| (z - value).abs() < 1e-5);
+        let close =
+            |plane: &Array2<f32>, value: f32| plane.iter().all(|z| (z - value).abs() < 1e-5);
         assert!(close(&motion.velocity.u, 5.0) && close(&motion.velocity.v, -2.0));
         assert!(close(&motion.acceleration.u, 2.0) && close(&motion.acceleration.v, -1.0));
         // One flow and the acceleration say as much as two flows.

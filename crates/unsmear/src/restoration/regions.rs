@@ -69,7 +69,8 @@ pub fn dilated(mask: &ArrayView2<'_, bool>, radius: usize) -> Array2<bool> {
         let mut reached = 0;
         for i in 0..n {
             if at(i) {
-                (reached.max(i.saturating_sub(radius))..(i + radius + 1).min(n)).for_each(&mut *set);
+                (reached.max(i.saturating_sub(radius))..(i + radius + 1).min(n))
+                    .for_each(&mut *set);
                 reached = i + radius + 1;
             }
         }
@@ -101,8 +102,7 @@ mod tests {
         ];
         let (labels, count) = regions(&mask.view());
         assert_eq!(count, 2);
-        let expected =
-            array![[1, 0, 1, 0, 0], [1, 0, 1, 0, 2], [0, 1, 0, 0, 2], [0, 0, 0, 0, 0]];
+        let expected = array![[1, 0, 1, 0, 0], [1, 0, 1, 0, 2], [0, 1, 0, 0, 2], [0, 0, 0, 0, 0]];
         assert_eq!(labels, expected);
         assert_eq!(regions(&Array2::from_elem((3, 3), false).view()).1, 0);
     }
