@@ -11,7 +11,7 @@
 use multiversion::multiversion;
 
 use super::Taps;
-use super::lanes::{LANES, Lanes, Parabola, curved_line, straight_line};
+use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared};
 use crate::motion_path::MotionPaths;
 
 /// Largest curvature q, px, of a path that is taken as straight: it leaves the line by an eighth of it.
@@ -28,12 +28,12 @@ const MOST_BEND: f32 = 0.8;
 pub(super) enum Kind {
     /// Not at all. Lanes: whether the pixel is meant, 1 or 0.
     Still,
-    /// Straight through themselves. Lanes: gain, b / a, a / 2.
+    /// Straight through themselves. Lanes: gain, a, b.
     Straight,
-    /// On parabolas. Lanes: gain, a, b, q_a, q_b.
+    /// On parabolas of little change of speed. Lanes: gain, a, b, q_a, q_b and, if there are offsets, d_a, d_b.
+    Gentle,
+    /// On any parabolas. Lanes: the same.
     Curved,
-    /// On parabolas with an offset. Lanes: gain, a, b, q_a, q_b, d_a, d_b.
-    Offset,
 }
 
 /// One block of one row on one axis.
@@ -52,8 +52,16 @@ pub(super) struct Record {
     /// Where its lines and lanes begin in the row's.
     pub(super) lines: u32,
     pub(super) lanes: u32,
+    pub(super) planes: u8,
     /// Rows of weights it makes.
     pub(super) rows: u32,
+}
+
+impl Record {
+    /// Its lanes out of those of its row.
+    pub(super) fn lanes_of<'a>(&self, lanes: &'a [Lanes]) -> &'a [Lanes] {
+        &lanes[self.lanes as usize..][..usize::from(self.planes)]
+    }
 }
 
 /// Minor positions of a block on one line: the floor of the least, and how much greater that of the greatest is.
@@ -118,6 +126,7 @@ impl RowPlan {
             inner: [0; 2],
             lines: self.lines.len() as u32,
             lanes: self.lanes.len() as u32,
+            planes: 1,
             rows: 0,
         }
     }
@@ -126,10 +135,11 @@ impl RowPlan {
     fn push_block(&mut self, column: usize, block: &Block, down: bool, taps: Taps) {
         let Some(any) = block.iter().flatten().next().copied() else { return };
         let paths = block.map(|path| path.unwrap_or(any));
-        let kind = if paths.iter().any(|p| p.offset != [0.0; 2]) {
-            Kind::Offset
-        } else if paths.iter().any(|p| p.curvature != [0.0; 2]) {
+        let offset = paths.iter().any(|p| p.offset != [0.0; 2]);
+        let kind = if paths.iter().any(|p| p.curvature[0].abs() > GENTLE * p.velocity[0]) {
             Kind::Curved
+        } else if offset || paths.iter().any(|p| p.curvature != [0.0; 2]) {
+            Kind::Gentle
         } else {
             Kind::Straight
         };
@@ -137,17 +147,15 @@ impl RowPlan {
         set_lines(&mut record, &paths, taps.reach());
         let plane = |value: fn(&Parabola) -> f32| Lanes(paths.each_ref().map(value));
         self.lanes.push(Lanes(block.map(|path| f32::from(u8::from(path.is_some())))));
-        if kind == Kind::Straight {
-            let slope = plane(|p| p.velocity[1] / p.velocity[0]);
-            self.lanes.extend([slope, plane(|p| 0.5 * p.velocity[0])]);
-        } else {
-            self.lanes.extend([plane(|p| p.velocity[0]), plane(|p| p.velocity[1])]);
+        self.lanes.extend([plane(|p| p.velocity[0]), plane(|p| p.velocity[1])]);
+        if kind != Kind::Straight {
             self.lanes.extend([plane(|p| p.curvature[0]), plane(|p| p.curvature[1])]);
         }
-        if kind == Kind::Offset {
+        if offset {
             self.lanes.extend([plane(|p| p.offset[0]), plane(|p| p.offset[1])]);
         }
-        let (before, lanes) = (self.lines.len(), &self.lanes[record.lanes as usize..]);
+        record.planes = (self.lanes.len() - record.lanes as usize) as u8;
+        let (before, lanes) = (self.lines.len(), record.lanes_of(&self.lanes));
         let sums = match taps {
             Taps::Cubic => survey::<true>(&record, lanes, &mut self.lines),
             Taps::Linear => survey::<false>(&record, lanes, &mut self.lines),
@@ -208,9 +216,9 @@ fn set_lines(record: &mut Record, paths: &[Parabola; LANES], reach: usize) {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<Line>) -> Lanes {
     let mut sums = Lanes::ZERO;
-    let (mut weight, mut minor) = (Lanes::ZERO, Lanes::ZERO);
+    let prepared = Prepared::new::<CUBIC>(lanes);
     for i in 0..record.count {
-        line_of::<CUBIC>(record, lanes, i as i16, &mut weight, &mut minor);
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
         let twice = if record.kind == Kind::Straight { 2.0 } else { 1.0 };
         let (mut least, mut most) = (minor.0[0], minor.0[0]);
         for lane in 0..LANES {
@@ -224,31 +232,17 @@ fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<L
     sums
 }
 
-/// Weights, times the gain, and minor positions of the pixels on the line number `i` of a record.
+/// Weights and minor positions of the pixels on the line number `i` of a record that moves.
 #[inline(always)]
-pub(super) fn line_of<const CUBIC: bool>(
-    record: &Record,
-    lanes: &[Lanes],
-    i: i16,
-    weight: &mut Lanes,
-    minor: &mut Lanes,
-) {
+pub(super) fn line_of<const CUBIC: bool>(record: &Record, paths: &Prepared, i: i16) -> [Lanes; 2] {
     let line = record.first + i;
     let inner = record.inner[0] <= line && line < record.inner[1];
+    let line = f32::from(line);
     match (record.kind, inner) {
-        (Kind::Still, _) => (*weight, *minor) = (lanes[0], Lanes::ZERO),
-        (Kind::Straight, _) => straight_line::<CUBIC>(lanes, f32::from(line), inner, weight, minor),
-        (Kind::Curved, true) => {
-            curved_line::<CUBIC, true, false>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Curved, false) => {
-            curved_line::<CUBIC, false, false>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Offset, true) => {
-            curved_line::<CUBIC, true, true>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Offset, false) => {
-            curved_line::<CUBIC, false, true>(lanes, f32::from(line), weight, minor);
-        }
+        (Kind::Still | Kind::Straight, _) => paths.straight::<CUBIC>(line, inner),
+        (Kind::Gentle, true) => paths.curved::<CUBIC, true, true>(line),
+        (Kind::Gentle, false) => paths.curved::<CUBIC, false, true>(line),
+        (Kind::Curved, true) => paths.curved::<CUBIC, true, false>(line),
+        (Kind::Curved, false) => paths.curved::<CUBIC, false, false>(line),
     }
 }

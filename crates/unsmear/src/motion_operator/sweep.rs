@@ -126,7 +126,7 @@ fn gather(record: &Record, rows: &Expanded, x: &[f32], start: usize) -> Lanes {
     match record.kind {
         Kind::Still => lanes_at(&x[start..], record),
         Kind::Straight => gather_rows::<true>(rows, x, place),
-        Kind::Curved | Kind::Offset => gather_rows::<false>(rows, x, place),
+        Kind::Gentle | Kind::Curved => gather_rows::<false>(rows, x, place),
     }
 }
 
