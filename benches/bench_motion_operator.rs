@@ -35,14 +35,14 @@ fn operator(criterion: &mut Criterion) {
             let x: Vec<f32> = sharp.index_axis(Axis(0), 0).iter().copied().collect();
             let weights = vec![1.0; SHAPE.0 * SHAPE.1];
             let (mut b, mut back) = (weights.clone(), x.clone());
-            one.install(|| {
-                group.bench_function(format!("A, {kind}"), |bencher| {
-                    bencher.iter(|| operator.apply(&x, &mut b));
-                });
-                group.bench_function(format!("A^T, {kind}"), |bencher| {
-                    bencher.iter(|| operator.adjoint(&b, &mut back));
-                });
-                group.bench_function(format!("A^T W A, {kind}"), |bencher| {
+            group.bench_function(format!("A, {kind}"), |bencher| {
+                one.install(|| bencher.iter(|| operator.apply(&x, &mut b)));
+            });
+            group.bench_function(format!("A^T, {kind}"), |bencher| {
+                one.install(|| bencher.iter(|| operator.adjoint(&b, &mut back)));
+            });
+            group.bench_function(format!("A^T W A, {kind}"), |bencher| {
+                one.install(|| {
                     bencher.iter(|| operator.normal(&x, &weights, &mut b, &mut back));
                 });
             });
