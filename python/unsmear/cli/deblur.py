@@ -34,9 +34,7 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
         default=1.0,
         help="share of the frame interval the shutter was open; default 1",
     )
-    verb.add_argument(
-        "--method", choices=METHODS, default="tv", help="default tv"
-    )
+    verb.add_argument("--method", choices=METHODS, default="tv", help="default tv")
     verb.add_argument(
         "--noise", type=float, help="standard deviation; default measured"
     )
