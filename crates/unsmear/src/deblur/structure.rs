@@ -47,7 +47,7 @@ impl Prior {
     /// Renews the weights of `smoothness` from the picture `channels`; `scratch` holds three planes, and afterwards
     /// nothing of meaning.
     pub(super) fn renew(
-        &self,
+        self,
         channels: &[Vec<f32>],
         smoothness: &mut Smoothness,
         scratch: [&mut Vec<f32>; 3],
