@@ -11,6 +11,7 @@ from unsmear.demo_clip import DemoClip, demo_clip
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
+from unsmear.motion_operator import MotionOperator
 from unsmear.psf import fspecial_motion, motion_psf
 from unsmear.sequences import read_frames, write_frames
 
@@ -20,6 +21,7 @@ __all__ = [
     "DemoClip",
     "FlowFileError",
     "FlowResult",
+    "MotionOperator",
     "__version__",
     "blur",
     "component_velocities",

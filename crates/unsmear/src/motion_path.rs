@@ -15,8 +15,8 @@
 //!
 //! s^2 (v.grad) v is the difference of V between the ends of the pixel's own straight path, half by
 //! half: a half that leaves the picture is shortened (where both leave it at once, in a corner, pixels beside are
-//! compared), and one on which the field is unknown or jumps (by more than [`SMALLEST_JUMP`] and
-//! [`RELATIVE_JUMP`] of |V|) counts for nothing, because the motion of another thing does not bend this one's path.
+//! compared), and one on which the field is unknown or jumps (by more than 1 px and
+//! 0.4 of |V|) counts for nothing, because the motion of another thing does not bend this one's path.
 //!
 //! Units: px; NaN = unknown motion. Validity: paths whose direction turns by less than a right angle.
 

@@ -20,6 +20,25 @@
 //!
 //! and of the triangle: kappa = 1 - n, |C| = n - n^2/2. Without branches, so that 16 pixels go at once.
 
+/// How x is interpolated between its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taps {
+    /// Keys' cubic: accurate, some weights negative.
+    Cubic,
+    /// The triangle: faster and less accurate, no weight negative, as Richardson-Lucy needs it.
+    Linear,
+}
+
+impl Taps {
+    /// Where the kernel ends, px.
+    pub(super) fn reach(self) -> usize {
+        match self {
+            Self::Cubic => 2,
+            Self::Linear => 1,
+        }
+    }
+}
+
 /// Pixels that go together: one register of the widest kind, a line of cache.
 pub(super) const LANES: usize = 16;
 

@@ -10,8 +10,7 @@
 
 use multiversion::multiversion;
 
-use super::Taps;
-use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared};
+use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
 use crate::motion_path::MotionPaths;
 
 /// Largest curvature q, px, of a path that is taken as straight: it leaves the line by an eighth of it.

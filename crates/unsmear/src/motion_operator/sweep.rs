@@ -9,9 +9,8 @@
 
 use multiversion::multiversion;
 
-use super::Taps;
 use super::expand::{Expanded, expand};
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, Taps};
 use super::plan::{Kind, Record, RowPlan};
 
 /// Records scattered together: a write that a later read overlaps has by then left the processor's queue
