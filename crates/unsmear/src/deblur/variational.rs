@@ -158,8 +158,9 @@ mod tests {
     /// Blocks of 50 grey levels on the padded grid.
     fn blocks(operator: &KernelOperator) -> Vec<f32> {
         let (rows, columns) = operator.unknown_shape();
-        let block =
-            |i: usize| if (i / columns / 9 + i % columns / 8) % 2 == 0 { 50.0 } else { 0.0 };
+        let block = |i: usize| {
+            if (i / columns / 9 + i % columns / 8).is_multiple_of(2) { 50.0 } else { 0.0 }
+        };
         (0..rows * columns).map(block).collect()
     }
 
