@@ -10,7 +10,8 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear._parameters import merged
-from unsmear.restoration.chain import Chain, Restored, Settings
+from unsmear.restoration.chain import Chain
+from unsmear.restoration.records import Restored, Settings
 from unsmear.restoration.source import Source
 
 if TYPE_CHECKING:

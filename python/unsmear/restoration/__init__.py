@@ -11,4 +11,5 @@
 | joint        | several frames restored as one                                   |
 | verdict      | what to use, where, in words                                     |
 | chain        | the order of the steps                                           |
+| records, memo| what goes in and comes out; what is kept                         |
 """

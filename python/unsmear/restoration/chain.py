@@ -9,7 +9,6 @@ to come can: memory does not grow with the clip.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +17,18 @@ from unsmear import _unsmear
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.joint import Neighbour, restore_jointly
-from unsmear.restoration.looks import TWIN, WALK, Look, cropped, look, walk
+from unsmear.restoration.looks import (
+    NEXT,
+    SHARP_STRENGTH,
+    TWIN,
+    WALK,
+    Look,
+    cropped,
+    look,
+    walk,
+)
 from unsmear.restoration.memo import Memo
+from unsmear.restoration.records import Restored, Settings
 from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
 from unsmear.restoration.verdict import Verdict, judge
 
@@ -33,44 +42,12 @@ if TYPE_CHECKING:
     Plane = NDArray[np.float32]
     Planes = NDArray[np.float32]
 
-__all__ = ["Chain", "Restored", "Settings"]
+__all__ = ["Chain"]
 
+SHARPER = 1.0
+"""Score of the sharper prior, relative to the other's, below which it is used."""
 KEPT_BEHIND = 5
 """Frames that one looks back on, through exposures and twins of its neighbours."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the user may set; see `unsmear.deblur_sequence`."""
-
-    exposure: float | None
-    noise: float | None
-    flow_method: str
-    flow_options: dict[str, Any]
-    joint: int
-    seed: int
-
-
-@dataclass(frozen=True)
-class Restored:
-    """A restored frame and how it came about.
-
-    Attributes
-    ----------
-    planes : ndarray of shape (C, H, W), float32
-        Grey levels.
-    changed : ndarray of shape (H, W), bool
-        Where it differs from what came.
-    ratio : float
-        Of the verdict.
-    report : dict
-        Plain data.
-    """
-
-    planes: Planes
-    changed: NDArray[np.bool_]
-    ratio: float
-    report: dict[str, Any]
 
 
 class Chain:
@@ -126,7 +103,14 @@ class Chain:
         motion = self.motion.motion(index)
         exposure = self._exposure.exposure(index).value
         visible = _unsmear.visibility(motion.velocity, exposure)
-        return look(planes, motion.velocity, motion.acceleration, exposure, visible)
+        return look(
+            planes,
+            motion.velocity,
+            motion.acceleration,
+            exposure,
+            visible,
+            ceiling=self._source.ceiling,
+        )
 
     def _walk(self, index: int) -> tuple[list[Planes], int]:
         """Return the frame's luma restored with every strength, padded."""
@@ -196,7 +180,7 @@ class Chain:
             report["verdict"] = "left as is: nothing moves enough to be blurred"
             return Restored(planes, nothing, float("nan"), report)
         strength = self._strength(index)
-        single, pad = self._single(index, strength)
+        single, pad, sharp = self._single(index, strength)
         luma = self._source.luma
         verdict = judge(
             luma(index),
@@ -205,31 +189,60 @@ class Chain:
             blur,
             exposure.status,
         )
-        report |= {"regularization": strength / self._source.scale} | verdict.report
+        report |= {
+            "regularization": strength / self._source.scale,
+            "sharp": sharp,
+            **verdict.report,
+        }
         if self._settings.joint > 1 and (verdict.share > 0).any():
-            single, pad, weight = self._joint(index, single, pad, strength)
+            single, pad, weight = self._joint(index, single, pad, strength, sharp=sharp)
             report["neighbours_weight"] = weight
         return self._composed(planes, cropped(single, pad), verdict, report)
 
-    def _single(self, index: int, strength: float) -> tuple[Planes, int]:
-        """Return the frame restored by itself, padded."""
+    def _single(self, index: int, strength: float) -> tuple[Planes, int, bool]:
+        """Return the frame restored by itself, padded, and whether sharply.
+
+        The sharper prior is better where the motion is right and worse where not: the
+        twins tell.
+        """
         noise = self._exposure.exposure(index).noise
-        planes = self._source.planes(index)
+        looks = [self._look(index, self._source.planes(index))]
         pictures, pad = self._walk(index)
-        if len(planes) > 1:
+        if len(looks[0]["planes"]) > 1:
             way = (strength,) if strength <= WALK[TWIN] else (WALK[TWIN], strength)
-            pictures, pad = walk([self._look(index, planes)], way, noise, pad=pad)
-            return pictures[-1], pad
-        below = max((k for k, one in enumerate(WALK) if one <= strength), default=0)
-        start = pictures[below]
-        looks = [self._look(index, planes)]
+            pictures, pad = walk(looks, way, noise, pad=pad)
+        else:
+            below = max((k for k, one in enumerate(WALK) if one <= strength), default=0)
+            start = pictures[below]
+            pictures, _ = walk(
+                looks, (strength,), noise, pad=pad, first=NEXT, start=start
+            )
+        cautious = pictures[-1]
         pictures, _ = walk(
-            looks, (strength,), noise, pad=pad, first=(3, 12), start=start
+            looks,
+            (SHARP_STRENGTH * strength,),
+            noise,
+            pad=pad,
+            first=NEXT,
+            start=cautious,
+            sharp=True,
         )
-        return pictures[-1], pad
+        scores = [
+            score(self._source.luma_of(cropped(one, pad)), self._twins(index))
+            for one in (pictures[-1], cautious)
+        ]
+        if scores[0] < SHARPER * scores[1]:
+            return pictures[-1], pad, True
+        return cautious, pad, False
 
     def _joint(
-        self, index: int, picture: Planes, pad: int, strength: float
+        self,
+        index: int,
+        picture: Planes,
+        pad: int,
+        strength: float,
+        *,
+        sharp: bool,
     ) -> tuple[Planes, int, float]:
         reach = self._settings.joint // 2
         neighbours = []
@@ -239,7 +252,9 @@ class Chain:
                 exposure = self._exposure.exposure(other).value
                 motion = self.motion.motion(other)
                 planes = self._source.planes(other)
-                neighbours.append(Neighbour(planes, motion, exposure, back, way))
+                neighbours.append(
+                    Neighbour(planes, motion, exposure, back, way, self._source.ceiling)
+                )
         own = self._look(index, self._source.planes(index))
         return restore_jointly(
             own,
@@ -249,6 +264,7 @@ class Chain:
             strength=strength,
             noise=self._exposure.exposure(index).noise,
             method=self._settings.flow_method,
+            sharp=sharp,
         )
 
     def _way(self, start: int, end: int) -> Planes | None:

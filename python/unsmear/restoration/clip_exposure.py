@@ -31,6 +31,7 @@ LIMITS = (0.35, 1.25)
 POOLED = 1
 SMOOTHED = 2
 LEAST_SPREAD = 0.02
+LEAST_VOTE, GREATEST_SPREAD = 0.6, 0.12
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Exposure:
     ----------
     value : float
         Share of the frame interval.
-    status : {"given", "ok", "unsure", "small"}
+    status : {"given", "ok", "unsure", "small", "beyond"}
+        "beyond": what was found is nothing that a shutter does.
     noise : float
         Standard deviation of the noise, grey levels.
     found : dict
@@ -109,6 +111,8 @@ class ClipExposure:
             value, status = own["value"], own["status"]
             if status == "ok":
                 value, status = min(value, 1.0), "unsure"
+            elif _beyond(own):
+                status = "beyond"
             return Exposure(float(value), status, own["noise"], own)
         weights = [
             (1 - abs(j - index) / (SMOOTHED + 1))
@@ -118,6 +122,12 @@ class ClipExposure:
         logs = [np.log(self._found(j)["value"]) for j in trusted]
         value = float(np.exp(np.average(logs, weights=weights)))
         return Exposure(value, "ok", own["noise"], own)
+
+
+def _beyond(found: dict[str, Any]) -> bool:
+    """Return whether the blur is surely longer, or shorter, than the limits allow."""
+    agreed = found["vote"] >= LEAST_VOTE and found["spread"] <= GREATEST_SPREAD
+    return bool(agreed and not LIMITS[0] <= found["likeliest"] <= LIMITS[1])
 
 
 def _stack(fields: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -24,7 +24,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.flow import optical_flow
-from unsmear.restoration.looks import Look, look, walk
+from unsmear.restoration.looks import SHARP_STRENGTH, Look, look, walk
 from unsmear.restoration.sampling import (
     carried,
     composed,
@@ -66,6 +66,8 @@ class Neighbour:
         Its own.
     offset, way : ndarray of shape (H, W, 2)
         Flow from it to the restored frame, and back.
+    ceiling : float or None
+        Grey level from which its samples are clipped.
     """
 
     def __init__(
@@ -75,11 +77,13 @@ class Neighbour:
         exposure: float,
         offset: Field,
         way: Field,
+        ceiling: float | None,
     ) -> None:
         self.planes = planes
         self.motion = motion
         self.exposure = exposure
         self.offset = offset
+        self.ceiling = ceiling
         visible = _unsmear.visibility(
             np.ascontiguousarray(motion.velocity, np.float32), exposure
         )
@@ -99,6 +103,7 @@ class Neighbour:
             self.exposure,
             weights,
             self.offset,
+            self.ceiling,
         )
 
     def register(self, picture: Planes, pad: int, method: str) -> None:
@@ -134,6 +139,7 @@ def restore_jointly(
     strength: float,
     noise: float,
     method: str,
+    sharp: bool,
     rounds: int = 1,
 ) -> tuple[Planes, int, float]:
     """Return the padded restoration, its padding, and the neighbours' mean weight.
@@ -149,8 +155,15 @@ def restore_jointly(
         needed = max(pad, _unsmear.looks_reach(looks))
         picture = np.pad(picture, ((0, 0), *2 * ((needed - pad,) * 2,)), mode="edge")
         pad = needed
+        way = STRENGTH * strength * (SHARP_STRENGTH if sharp else 1.0)
         pictures, _ = walk(
-            looks, (STRENGTH * strength,), noise, pad=pad, first=EFFORT, start=picture
+            looks,
+            (way,),
+            noise,
+            pad=pad,
+            first=EFFORT,
+            start=picture,
+            sharp=sharp,
         )
         picture = pictures[-1]
     return picture, pad, weight

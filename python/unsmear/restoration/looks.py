@@ -19,8 +19,11 @@ WALK = (0.015, 0.045, 0.13, 0.4)
 TWIN = 1
 """Which of them makes the restorations that frames are compared with."""
 
-FIRST = (6, 12)
-"""Turns and steps of a restoration from the blurred picture."""
+FIRST = (4, 12)
+"""Turns and steps of a restoration that starts from half size."""
+
+SHARP_STRENGTH = 1.4
+"""Strength of the sharper prior, relative to that of total variation."""
 
 NEXT = (3, 12)
 """Turns and steps of one that starts from another of nearly the same strength."""
@@ -35,6 +38,7 @@ class Look(TypedDict):
     acceleration: NDArray[np.float32]
     offset: NDArray[np.float32] | None
     exposure: float
+    ceiling: float | None
 
 
 def look(
@@ -44,6 +48,7 @@ def look(
     exposure: float,
     weights: NDArray[np.float32],
     offset: NDArray[np.float32] | None = None,
+    ceiling: float | None = None,
 ) -> Look:
     """Return one look; unknown motion and offset are not believed."""
     known = np.isfinite(velocity).all(axis=-1)
@@ -57,6 +62,7 @@ def look(
         "acceleration": np.ascontiguousarray(np.nan_to_num(acceleration), np.float32),
         "offset": offset,
         "exposure": float(exposure),
+        "ceiling": ceiling,
     }
 
 
@@ -73,12 +79,21 @@ def walk(
     pad: int | None = None,
     first: tuple[int, int] = FIRST,
     start: NDArray[np.float32] | None = None,
+    sharp: bool = False,
 ) -> tuple[list[NDArray[np.float32]], int]:
     """Return the padded restorations (C, H + 2 pad, W + 2 pad), and the padding."""
     if pad is None:
         pad = _unsmear.looks_reach(looks)
     pictures, _ = _unsmear.restore_looks(
-        looks, pad, list(lambdas), robust_scale(noise), first, NEXT, start
+        looks,
+        pad,
+        list(lambdas),
+        noise,
+        robust_scale(noise),
+        first,
+        NEXT,
+        sharp,
+        start,
     )
     return pictures, pad
 

@@ -45,11 +45,14 @@ class Source:
         T.
     scale : float
         Grey levels per unit of the frames.
+    ceiling : float or None
+        Grey level from which a sample is clipped; None for floats, which are not.
     """
 
     def __init__(self, frames: ArrayLike, channel_axis: int | None) -> None:
         array = as_picture_array(frames, "frames")
         self._axis = channel_axis
+        self.ceiling: float | None
         if channel_axis is None:
             require_ndim(
                 array, "frames", 3, "(T, H, W) (or say which channel_axis is colour)"
@@ -66,8 +69,10 @@ class Source:
             known = np.asarray(self._frames[0], np.float64)
             deviation = float(np.std(known[np.isfinite(known)])) if known.size else 0.0
             self.scale = CONTRAST / deviation if deviation > 0 else 1.0
+            self.ceiling = None
         else:
             self.scale = GREY_LEVELS / scale_of(array.dtype)
+            self.ceiling = GREY_LEVELS - 0.5
 
     def frame(self, index: int) -> NDArray[Any]:
         """Return a frame (H, W, C) as it came."""

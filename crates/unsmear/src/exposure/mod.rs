@@ -4,7 +4,7 @@
 //! zeros in the spectrum of each part of a blurred picture, at waves with w . (s v) = 2 pi n. One s is sought for a
 //! whole picture or clip:
 //!
-//! 1. tiles of 64 px (48 or 32 in small pictures) with one motion and enough contrast (`tile.rs`);
+//! 1. tiles of 64 px (48 or 32 in small pictures or for small movers) with one motion and enough contrast (`tile.rs`);
 //! 2. for each, Whittle's likelihood over a grid of s and twelve shapes of the scene's spectrum (`likelihood.rs`),
 //!    with paths of constant acceleration (`path_spectrum.rs`); tiles whose blur at s is shorter than 2.4 px have no
 //!    zero in the band and are left out;
@@ -30,8 +30,7 @@ mod vote;
 pub use self::frame::ExposureFrame;
 use self::random::Random;
 use self::search::{LEAST_BLUR, search};
-use self::tile::Waves;
-use self::tile_choice::{choose_tiles, tile_side};
+use self::tile_choice::choose_tiles;
 use self::vote::vote;
 use crate::array::require_same;
 use crate::control::Control;
@@ -111,20 +110,16 @@ impl ExposureSearch {
         control: &Control,
     ) -> Result<ExposureEstimate> {
         self.validate(frames)?;
-        let (height, width) = frames[0].image.dim();
         let mut random = Random::new(self.seed);
         let beyond = (self.range.0 / MARGIN, self.range.1 * MARGIN);
         let noise = self.noise_used(frames, control)?;
         let nothing = || Ok(without_tiles(frames, noise));
-        let (Some(side), true) = (tile_side(height.min(width)), noise > 0.0) else {
-            return nothing();
-        };
-        let waves = Waves::new(side);
-        let least_speed = LEAST_BLUR / beyond.1;
-        let tiles = choose_tiles(frames, &waves, noise, least_speed, &mut random, control)?;
-        if tiles.is_empty() {
+        if noise == 0.0 {
             return nothing();
         }
+        let least_speed = LEAST_BLUR / beyond.1;
+        let chosen = choose_tiles(frames, noise, least_speed, &mut random, control)?;
+        let Some((waves, tiles)) = chosen else { return nothing() };
         let Some(found) = search(&tiles, &waves, beyond, noise, &mut random, control)? else {
             return nothing();
         };

@@ -13,6 +13,9 @@ use crate::error::Result;
 /// Shortest blur with a zero in the band, px.
 pub(super) const LEAST_BLUR: f64 = 2.4;
 
+/// Longest blur that a tile shows, as a share of its side.
+const LONGEST_BLUR: f64 = 0.75;
+
 /// Step of the first grid in log s, and of the finer one.
 const STEPS: [f64; 2] = [0.095, 0.02];
 
@@ -53,7 +56,7 @@ pub(super) fn search(
     let steps = (octaves / STEPS[0]).ceil();
     let grid: Vec<f64> = (0..=steps as usize).map(|i| first + i as f64 / steps * octaves).collect();
     let all = likelihoods.curves(&grid)?;
-    let Some((coarse, used)) = gated(&all, tiles, &grid) else { return Ok(None) };
+    let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else { return Ok(None) };
     let log_scale = if coarse.inside {
         let fine: Vec<f64> =
             (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
@@ -107,9 +110,18 @@ impl<'a> Likelihoods<'a> {
 }
 
 /// The optimum of the tiles long enough at it, and which these are; None when there are none.
-fn gated(curves: &[Vec<f64>], tiles: &[Tile], grid: &[f64]) -> Option<(Optimum, Vec<usize>)> {
+fn gated(
+    curves: &[Vec<f64>],
+    tiles: &[Tile],
+    side: usize,
+    grid: &[f64],
+) -> Option<(Optimum, Vec<usize>)> {
     let long_enough = |log_scale: f64| -> Vec<usize> {
-        (0..tiles.len()).filter(|&i| tiles[i].speed * log_scale.exp() > LEAST_BLUR).collect()
+        let fits = |tile: &Tile| {
+            let blur = tile.speed * log_scale.exp();
+            blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
+        };
+        (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
     };
     let best = |used: &[usize]| optimum(used.iter().map(|&i| curves[i].as_slice()), grid);
     let mut used = long_enough(grid[grid.len() - 1].min(0.0));

@@ -1,4 +1,4 @@
-//! Which tiles of the frames are used: a random hundred of those that tell something.
+//! Which tiles of the frames are used: a random hundred of those that tell something, as large as can be.
 //!
 //! Corners lie half a tile apart. A fixed seed puts them in an order, in which they are looked at until enough have
 //! been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
@@ -19,18 +19,40 @@ const MOST_TILES: usize = 100;
 /// Tiles looked at together; a fixed number, so that the result does not depend on threads.
 const BATCH: usize = 128;
 
-/// Side of the tiles for a picture whose shorter side is `shorter`, px.
-pub(super) fn tile_side(shorter: usize) -> Option<usize> {
-    match shorter {
-        256.. => Some(64),
-        96.. => Some(48),
-        32.. => Some(32),
-        _ => None,
+/// Sides of tiles, px, and the shorter side of the smallest picture for each.
+const SIDES: [(usize, usize); 3] = [(64, 256), (48, 96), (32, 32)];
+
+/// Tiles from which smaller ones, which tell less each, are not tried.
+const ENOUGH_TILES: usize = 12;
+
+/// Tiles of the greatest side of which there are enough, or else of that with most; None when there are none.
+pub(super) fn choose_tiles<T: Real>(
+    frames: &[ExposureFrame<'_, T>],
+    noise: f64,
+    least_speed: f64,
+    random: &mut Random,
+    control: &Control,
+) -> Result<Option<(Waves, Vec<Tile>)>> {
+    let (height, width) = frames[0].image.dim();
+    let mut best: Option<(Waves, Vec<Tile>)> = None;
+    for (side, shortest) in SIDES {
+        if height.min(width) < shortest {
+            continue;
+        }
+        let waves = Waves::new(side);
+        let tiles = tiles_of(frames, &waves, noise, least_speed, random, control)?;
+        if tiles.len() > best.as_ref().map_or(0, |(_, most)| most.len()) {
+            best = Some((waves, tiles));
+        }
+        if best.as_ref().is_some_and(|(_, most)| most.len() >= ENOUGH_TILES) {
+            break;
+        }
     }
+    Ok(best)
 }
 
 /// At most [`MOST_TILES`] tiles faster than `least_speed` (px/frame) that tell something.
-pub(super) fn choose_tiles<T: Real>(
+fn tiles_of<T: Real>(
     frames: &[ExposureFrame<'_, T>],
     waves: &Waves,
     noise: f64,
