@@ -92,7 +92,7 @@ impl CoarseToFine {
             ..*sequence
         };
         let ways = [*sequence, reversed];
-        let ways = &ways[..1 + usize::from(self.forward_backward)];
+        let ways = &ways[..=usize::from(self.forward_backward)];
         control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
         let (mut estimate, levels) = self.one_way(sequence, control)?;
         for way in &ways[1..] {

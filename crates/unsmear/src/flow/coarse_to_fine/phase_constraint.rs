@@ -203,8 +203,8 @@ fn constraint(filter: &Filter, one: &Cross, other: &Cross) -> [f32; TERMS] {
     let steady = off * off;
     let alike = both / sum;
     let square = alike * alike;
-    let weight = 16.0 * both * square * square
-        / ((both + filter.weighting.floor) * (1.0 + steady * steady));
+    let weight =
+        16.0 * both * square * square / ((both + filter.weighting.floor) * (1.0 + steady * steady));
     // Not only weightless: what is not finite must not reach the sums.
     let kept = off < FARTHEST && weight > 0.0;
     let select = |value: f32| if kept { value } else { 0.0 };
