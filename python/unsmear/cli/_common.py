@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from unsmear._parameters import PARAMETERS
+from unsmear._plain_data import plain_data
 from unsmear.sequences import read_frames
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
 def show_result(result: dict[str, Any], *, as_json: bool) -> None:
     """Print a result: JSON, or one aligned line per entry."""
     if as_json:
-        print(json.dumps(plain(result), indent=2))
+        print(json.dumps(plain_data(result), indent=2))
         return
     flat = dict(_flatten(result))
     width = max(map(len, flat), default=0)
@@ -90,14 +91,3 @@ def _text(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(_text, value)) or "none"
     return str(value)
-
-
-def plain(value: Any) -> Any:
-    """Replace what JSON cannot say (NaN, infinity) by null."""
-    if isinstance(value, dict):
-        return {str(name): plain(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -11,6 +11,7 @@ import numpy as np
 
 from unsmear import metrics
 from unsmear._atomic import write_bytes_atomic
+from unsmear._plain_data import plain_data
 from unsmear.cli import _common
 from unsmear.flow_files import read_flow
 from unsmear.images import read_image
@@ -114,7 +115,7 @@ def _run_suite(options: argparse.Namespace) -> None:
         runs=options.runs,
         report=lambda line: print(line, file=sys.stderr),
     )
-    plain = json.dumps(_common.plain(result), indent=1) + "\n"
+    plain = json.dumps(plain_data(result), indent=1) + "\n"
     table = markdown(result)
     if options.output:
         output = Path(options.output)
