@@ -168,7 +168,8 @@ def of_memory(frames: Array) -> list[dict[str, Any]]:
                     "found": float("nan") if peak is None else peak,
                     "median": None,
                     "least_seconds": [],
-                    "held": peak is None or peak <= MEMORY_BAR,
+                    # Where the system does not tell, nothing is held.
+                    "held": peak is not None and peak <= MEMORY_BAR,
                 }
             )
     return rows

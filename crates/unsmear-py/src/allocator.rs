@@ -14,8 +14,9 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 /// `mi_option_purge_delay` of `mimalloc.h`, the same number in its versions 2 and 3.
 const PURGE_DELAY: mi_option_t = 15;
 
-/// Milliseconds; large blocks stay ten times as long (`mi_option_arena_purge_mult`).
-const KEPT: c_long = 1000;
+/// Milliseconds. All that is free goes back together when the delay of the first of it ends: with less than several
+/// calls' time that would be every call.
+const KEPT: c_long = 10_000;
 
 /// Sets how long freed memory stays with the process.
 #[allow(unsafe_code, reason = "the allocator's options have no other interface")]

@@ -67,10 +67,14 @@ def _head(result: dict[str, Any]) -> list[str]:
         "All pixels of known truth, no border cropped; each method has one set of "
         "parameters for all sequences. Methods of two frames get the frame of the "
         "truth and the next, the others what they take of all. Seconds are those of "
-        f"one processor, the least of {result['runs']} runs.",
+        f"one processor{_least_of(result['runs'])}.",
         "",
         f"Sequences and frames: {sizes}.",
     ]
+
+
+def _least_of(runs: int) -> str:
+    return f", the least of {runs} runs" if runs > 1 else ""
 
 
 def _groups(names: list[str]) -> list[tuple[str, list[tuple[str, None]]]]:
