@@ -57,7 +57,7 @@ const CAUTIOUS_PRIOR: Prior = Prior { rounding: 0.5, power: Power::One };
 pub struct Effort {
     /// Turns and steps per turn at half size.
     pub half: (usize, usize),
-    /// Turns, >= 2, and steps per turn at full size.
+    /// Turns, >= 1, and steps per turn at full size; a single turn adapts neither prior nor weights.
     pub full: (usize, usize),
 }
 
