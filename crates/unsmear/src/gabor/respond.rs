@@ -20,7 +20,7 @@ impl<T: Real> GaborBank<T> {
     /// Responses of all filters to a picture (H, W).
     ///
     /// # Errors
-    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    /// [`Error::Cancelled`].
     pub fn respond(
         &self,
         picture: ArrayView2<'_, T>,
@@ -37,8 +37,8 @@ impl<T: Real> GaborBank<T> {
     /// `scratch` of any size, which afterwards has the size it needs.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) for responses of another shape,
-    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    /// [`Error::Shape`] for responses of another shape,
+    /// [`Error::Cancelled`].
     pub fn respond_into(
         &self,
         picture: ArrayView2<'_, T>,
