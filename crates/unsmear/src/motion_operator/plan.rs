@@ -11,6 +11,7 @@
 use multiversion::multiversion;
 
 use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
+use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 
 /// Largest curvature q, px, of a path that is taken as straight: it leaves the line by an eighth of it.
@@ -87,6 +88,9 @@ impl RowPlan {
     /// The plan of row `y`.
     pub(super) fn new(paths: &MotionPaths, y: usize, taps: Taps) -> Self {
         let width = paths.dim().1;
+        let row_of = |field: &FlowField<f32>| [field.u.row(y).to_vec(), field.v.row(y).to_vec()];
+        let (motion, bend) = (row_of(&paths.velocity), row_of(&paths.curvature));
+        let shift = paths.offset.as_ref().map(row_of);
         let mut plan = Self::default();
         for first in (0..width).step_by(LANES) {
             // The last block is moved back onto the picture; what the one before does is left out.
@@ -94,7 +98,8 @@ impl RowPlan {
             let mut still = Lanes::ZERO;
             let mut moving: [Block; 2] = [[None; LANES]; 2];
             for x in first..(column + LANES).min(width) {
-                match path_of(paths, y, x) {
+                let shift = shift.as_ref().map_or([0.0; 2], |[u, v]| [u[x], v[x]]);
+                match path_of([motion[0][x], motion[1][x]], [bend[0][x], bend[1][x]], shift) {
                     None => still.0[x - column] = 1.0,
                     Some((path, down)) => moving[usize::from(down)][x - column] = Some(path),
                 }
@@ -175,11 +180,8 @@ impl RowPlan {
     }
 }
 
-/// The path of pixel (row y, column x), and whether its major axis is the vertical one; None: still, or unknown.
-fn path_of(paths: &MotionPaths, y: usize, x: usize) -> Option<(Parabola, bool)> {
-    let [u, v] = paths.velocity.view().at(y, x);
-    let bend = paths.curvature.view().at(y, x);
-    let shift = paths.offset.as_ref().map_or([0.0; 2], |offset| offset.view().at(y, x));
+/// The path of V = (u, v), q and d, and whether its major axis is the vertical one; None: still, or unknown.
+fn path_of([u, v]: [f32; 2], bend: [f32; 2], shift: [f32; 2]) -> Option<(Parabola, bool)> {
     let down = v.abs() > u.abs();
     let order = |[x, y]: [f32; 2]| if down { [y, x] } else { [x, y] };
     let [a, b] = order([u, v]);
@@ -200,13 +202,18 @@ fn path_of(paths: &MotionPaths, y: usize, x: usize) -> Option<(Parabola, bool)> 
 
 /// Sets the lines that weigh anything, and those inside of all paths.
 fn set_lines(record: &mut Record, paths: &[Parabola; LANES], reach: usize) {
-    let end = |i: usize| paths.iter().map(move |p| p.offset[0] + p.ends()[i]);
-    let least = |i: usize| end(i).fold(f32::INFINITY, f32::min);
-    let most = |i: usize| end(i).fold(f32::NEG_INFINITY, f32::max);
+    let (mut least, mut most) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for path in paths {
+        for (i, end) in path.ends().into_iter().enumerate() {
+            let end = path.offset[0] + end;
+            least[i] = if end < least[i] { end } else { least[i] };
+            most[i] = if end > most[i] { end } else { most[i] };
+        }
+    }
     let reach = reach as f32;
-    let first = (least(0) - reach).floor() as i16 + 1;
-    let last = (most(1) + reach).ceil() as i16 - 1;
-    record.inner = [(most(0) + reach).ceil() as i16, (least(1) - reach).floor() as i16 + 1];
+    let first = (least[0] - reach).floor() as i16 + 1;
+    let last = (most[1] + reach).ceil() as i16 - 1;
+    record.inner = [(most[0] + reach).ceil() as i16, (least[1] - reach).floor() as i16 + 1];
     record.first = if record.kind == Kind::Straight { 0 } else { first };
     record.count = (last - record.first + 1) as u16;
 }
