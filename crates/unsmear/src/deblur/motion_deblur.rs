@@ -40,7 +40,7 @@ const LEAST_SEEN: f32 = 0.25;
 pub enum MotionMethod {
     /// Total variation; see [`TotalVariation`].
     TotalVariation(Effort),
-    /// Half the square of the gradient as prior, by conjugate gradients; see [`Variational`].
+    /// Half the square of the gradient as prior, by conjugate gradients; see [`Tikhonov`].
     Tikhonov,
     /// See [`RichardsonLucy`].
     RichardsonLucy,

@@ -34,7 +34,7 @@ const SPACING: f32 = 2.0;
 /// Most samples on half a path.
 const MOST_SAMPLES: f32 = 64.0;
 
-/// Weights (H, W), 0 or 1, of data blurred by `flow` times `exposure`; see the [module](self).
+/// Weights (H, W), 0 or 1, of data blurred by `flow` times `exposure`; see the head of `occlusion.rs`.
 ///
 /// # Errors
 /// [`Error::Value`](crate::Error::Value) when `exposure` is not positive; [`Error::Cancelled`](crate::Error::Cancelled).

@@ -25,7 +25,7 @@ use super::smoothness::Smoothness;
 /// Rows per task.
 const ROWS_PER_TASK: usize = 8;
 
-/// How gradients become weights; see the [module](self).
+/// How gradients become weights; see the head of `structure.rs`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Gradient eps below which the prior is quadratic, grey levels per px, > 0.
@@ -34,7 +34,7 @@ pub struct Prior {
     pub power: Power,
 }
 
-/// Powers of the prior; see the [module](self).
+/// Powers of the prior; see the head of `structure.rs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Power {
     /// p = 1, convex.

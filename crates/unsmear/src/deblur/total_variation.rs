@@ -79,7 +79,7 @@ impl Effort {
 pub struct TotalVariation {
     /// Standard deviation of the noise, grey levels, >= 0.
     pub noise: f64,
-    /// lambda, grey levels; None: by the rules of the [module](self).
+    /// lambda, grey levels; None: by the rules at the head of `total_variation.rs`.
     pub lambda: Option<f64>,
     /// How long to work.
     pub effort: Effort,
