@@ -1,4 +1,4 @@
-"""Shorter and longer exposures, tried where the search for the exposure was not sure."""
+"""Shorter and longer exposures, tried where the search was not sure."""
 
 from __future__ import annotations
 
