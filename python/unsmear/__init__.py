@@ -12,6 +12,7 @@ from unsmear.exposure import ExposureEstimate, estimate_exposure
 from unsmear.flow import FlowResult, optical_flow
 from unsmear.flow_files import FlowFileError, read_flow, write_flow
 from unsmear.images import read_image, write_image
+from unsmear.motion_operator import MotionOperator
 from unsmear.psf import fspecial_motion, motion_psf
 from unsmear.sequence import SequenceResult, deblur_sequence
 from unsmear.sequences import read_frames, write_frames
@@ -24,6 +25,7 @@ __all__ = [
     "FlowFileError",
     "FlowResult",
     "SequenceResult",
+    "MotionOperator",
     "__version__",
     "blur",
     "component_velocities",

@@ -5,7 +5,7 @@ called with steps done and steps expected; what it raises cancels the call.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, TypeAlias, TypedDict, overload
+from typing import Any, Literal, TypeAlias, TypedDict, final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ _Parameters: TypeAlias = Mapping[str, Any]
 _Progress: TypeAlias = Callable[[int, int], object]
 
 __all__ = [
+    "MotionOperator",
     "__version__",
     "blur_f32",
     "blur_f64",
@@ -284,6 +285,26 @@ def frame_motion(
 def visibility(velocity: _Single, exposure: float) -> _Single: ...
 def regions(mask: NDArray[np.bool_]) -> tuple[NDArray[np.uint32], int]: ...
 def dilated(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]: ...
+
+@final
+class MotionOperator:
+    def __new__(
+        cls,
+        velocity: NDArray[Any],
+        exposure: float,
+        acceleration: NDArray[Any] | None,
+        offset: NDArray[Any] | None,
+        taps: str,
+        pad: int | None,
+    ) -> MotionOperator: ...
+    @property
+    def unknown_shape(self) -> tuple[int, int]: ...
+    @property
+    def data_shape(self) -> tuple[int, int]: ...
+    @property
+    def pad(self) -> int: ...
+    def forward(self, x: _Single) -> _Single: ...
+    def adjoint(self, b: _Single) -> _Single: ...
 
 # Metrics.
 

@@ -14,6 +14,7 @@ mod flow;
 mod interpolate;
 mod metrics;
 mod motion_deblur;
+mod motion_operator;
 mod parameters;
 mod psf;
 mod restoration;
@@ -46,6 +47,8 @@ mod _unsmear {
     use crate::metrics::{error_map, estimate_noise, psnr, ssim};
     #[pymodule_export]
     use crate::motion_deblur::{motion_deblur_f32, motion_deblur_f64};
+    #[pymodule_export]
+    use crate::motion_operator::MotionOperator;
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]

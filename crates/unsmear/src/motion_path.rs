@@ -14,9 +14,9 @@
 //! (the sum of the flows to the next and to the former frame), q = s^2 [2 (v.grad) v - A].
 //!
 //! s^2 (v.grad) v is the difference of V between the ends of the pixel's own straight path, half by
-//! half: a half that leaves the picture is shortened, and one on which the field is unknown or jumps
-//! (by more than [`SMALLEST_JUMP`] and [`RELATIVE_JUMP`] of |V|) counts for nothing, because the motion
-//! of another thing does not bend this one's path.
+//! half: a half that leaves the picture is shortened (where both leave it at once, in a corner, pixels beside are
+//! compared), and one on which the field is unknown or jumps (by more than 1 px and
+//! 0.4 of |V|) counts for nothing, because the motion of another thing does not bend this one's path.
 //!
 //! Units: px; NaN = unknown motion. Validity: paths whose direction turns by less than a right angle.
 
@@ -220,7 +220,23 @@ fn advection(field: &FlowView<'_, f32>, y: usize, x: usize) -> [f32; 2] {
             span += 0.5 * share;
         }
     }
-    change.map(|z| if span > 0.0 { z / span } else { 0.0 })
+    if span > 0.0 { change.map(|z| z / span) } else { from_neighbours(field, y, x) }
+}
+
+/// s^2 (v.grad) v from the pixels beside, for corners that the path leaves both ways; 0 across jumps and unknown pixels.
+fn from_neighbours(field: &FlowView<'_, f32>, y: usize, x: usize) -> [f32; 2] {
+    let (height, width) = field.dim();
+    let motion = field.at(y, x);
+    let between = |[y0, x0]: [usize; 2], [y1, x1]: [usize; 2]| {
+        let (from, to) = (field.at(y0, x0), field.at(y1, x1));
+        let distance = ((y1 - y0) + (x1 - x0)).max(1) as f32;
+        [0, 1].map(|axis| (to[axis] - from[axis]) / distance)
+    };
+    let across = between([y, x.saturating_sub(1)], [y, (x + 1).min(width - 1)]);
+    let down = between([y.saturating_sub(1), x], [(y + 1).min(height - 1), x]);
+    let change = [0, 1].map(|axis| motion[0] * across[axis] + motion[1] * down[axis]);
+    let jump = 2.0 * SMALLEST_JUMP.max(RELATIVE_JUMP * motion[0].hypot(motion[1]));
+    if change.iter().all(|z| z.abs() <= jump) { change } else { [0.0; 2] }
 }
 
 /// Share of `step` from the pixel that stays on the picture.
@@ -272,3 +288,6 @@ fn halved(field: &FlowField<f32>) -> FlowField<f32> {
         v: shrink(&field.v, half.0 as f32 / height as f32),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,7 +6,7 @@
 
 use multiversion::multiversion;
 
-use super::lanes::{LANES, Lanes, four_taps};
+use super::lanes::{LANES, Lanes, Prepared, four_taps};
 use super::plan::{Kind, Record, RowPlan, line_of};
 
 /// Added and subtracted, rounds to a whole number whatever is far smaller: 3/2 2^23.
@@ -43,17 +43,17 @@ pub(super) fn expand<const CUBIC: bool>(
     out: &mut Expanded,
 ) {
     out.reserve(record.rows as usize);
-    let lanes = &plan.lanes[record.lanes as usize..];
+    let lanes = record.lanes_of(&plan.lanes);
     if record.kind == Kind::Still {
         (out.weights[0], out.deltas[0]) = (lanes[0], 0);
         return;
     }
     let (along, across) = if record.down { (stride, 1) } else { (1, stride) };
     let lines = &plan.lines[record.lines as usize..][..usize::from(record.count)];
-    let (mut weight, mut minor) = (Lanes::ZERO, Lanes::ZERO);
+    let prepared = Prepared::new::<CUBIC>(lanes);
     let mut row = 0;
     for (i, line) in lines.iter().enumerate() {
-        line_of::<CUBIC>(record, lanes, i as i16, &mut weight, &mut minor);
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
         let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
         let count = taps + usize::from(line.span);
         let rows = &mut out.weights[row..];

@@ -42,29 +42,12 @@ use lanes::LANES;
 use plan::RowPlan;
 use sweep::{Scratch, gather_row, normal_row, scatter_row};
 
+pub use lanes::Taps;
+
 /// Rows gathered per task.
 const ROWS_PER_TASK: usize = 8;
 /// Rows of data scattered per task, at least: some 2 ms of work on a wide picture.
 const LEAST_BAND: usize = 64;
-
-/// How x is interpolated between its pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Taps {
-    /// Keys' cubic: accurate, some weights negative.
-    Cubic,
-    /// The triangle: faster and less accurate, no weight negative, as Richardson-Lucy needs it.
-    Linear,
-}
-
-impl Taps {
-    /// Where the kernel ends, px.
-    fn reach(self) -> usize {
-        match self {
-            Self::Cubic => 2,
-            Self::Linear => 1,
-        }
-    }
-}
 
 /// The blur of [`MotionPaths`]; see the [module](self).
 ///

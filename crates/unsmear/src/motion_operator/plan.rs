@@ -10,8 +10,8 @@
 
 use multiversion::multiversion;
 
-use super::Taps;
-use super::lanes::{LANES, Lanes, Parabola, curved_line, straight_line};
+use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
+use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 
 /// Largest curvature q, px, of a path that is taken as straight: it leaves the line by an eighth of it.
@@ -28,12 +28,12 @@ const MOST_BEND: f32 = 0.8;
 pub(super) enum Kind {
     /// Not at all. Lanes: whether the pixel is meant, 1 or 0.
     Still,
-    /// Straight through themselves. Lanes: gain, b / a, a / 2.
+    /// Straight through themselves. Lanes: gain, a, b.
     Straight,
-    /// On parabolas. Lanes: gain, a, b, q_a, q_b.
+    /// On parabolas of little change of speed. Lanes: gain, a, b, q_a, q_b and, if there are offsets, d_a, d_b.
+    Gentle,
+    /// On any parabolas. Lanes: the same.
     Curved,
-    /// On parabolas with an offset. Lanes: gain, a, b, q_a, q_b, d_a, d_b.
-    Offset,
 }
 
 /// One block of one row on one axis.
@@ -52,8 +52,16 @@ pub(super) struct Record {
     /// Where its lines and lanes begin in the row's.
     pub(super) lines: u32,
     pub(super) lanes: u32,
+    pub(super) planes: u8,
     /// Rows of weights it makes.
     pub(super) rows: u32,
+}
+
+impl Record {
+    /// Its lanes out of those of its row.
+    pub(super) fn lanes_of<'a>(&self, lanes: &'a [Lanes]) -> &'a [Lanes] {
+        &lanes[self.lanes as usize..][..usize::from(self.planes)]
+    }
 }
 
 /// Minor positions of a block on one line: the floor of the least, and how much greater that of the greatest is.
@@ -80,6 +88,9 @@ impl RowPlan {
     /// The plan of row `y`.
     pub(super) fn new(paths: &MotionPaths, y: usize, taps: Taps) -> Self {
         let width = paths.dim().1;
+        let row_of = |field: &FlowField<f32>| [field.u.row(y).to_vec(), field.v.row(y).to_vec()];
+        let (motion, bend) = (row_of(&paths.velocity), row_of(&paths.curvature));
+        let shift = paths.offset.as_ref().map(row_of);
         let mut plan = Self::default();
         for first in (0..width).step_by(LANES) {
             // The last block is moved back onto the picture; what the one before does is left out.
@@ -87,7 +98,8 @@ impl RowPlan {
             let mut still = Lanes::ZERO;
             let mut moving: [Block; 2] = [[None; LANES]; 2];
             for x in first..(column + LANES).min(width) {
-                match path_of(paths, y, x) {
+                let shift = shift.as_ref().map_or([0.0; 2], |[u, v]| [u[x], v[x]]);
+                match path_of([motion[0][x], motion[1][x]], [bend[0][x], bend[1][x]], shift) {
                     None => still.0[x - column] = 1.0,
                     Some((path, down)) => moving[usize::from(down)][x - column] = Some(path),
                 }
@@ -118,6 +130,7 @@ impl RowPlan {
             inner: [0; 2],
             lines: self.lines.len() as u32,
             lanes: self.lanes.len() as u32,
+            planes: 1,
             rows: 0,
         }
     }
@@ -126,10 +139,11 @@ impl RowPlan {
     fn push_block(&mut self, column: usize, block: &Block, down: bool, taps: Taps) {
         let Some(any) = block.iter().flatten().next().copied() else { return };
         let paths = block.map(|path| path.unwrap_or(any));
-        let kind = if paths.iter().any(|p| p.offset != [0.0; 2]) {
-            Kind::Offset
-        } else if paths.iter().any(|p| p.curvature != [0.0; 2]) {
+        let offset = paths.iter().any(|p| p.offset != [0.0; 2]);
+        let kind = if paths.iter().any(|p| p.curvature[0].abs() > GENTLE * p.velocity[0]) {
             Kind::Curved
+        } else if offset || paths.iter().any(|p| p.curvature != [0.0; 2]) {
+            Kind::Gentle
         } else {
             Kind::Straight
         };
@@ -137,17 +151,15 @@ impl RowPlan {
         set_lines(&mut record, &paths, taps.reach());
         let plane = |value: fn(&Parabola) -> f32| Lanes(paths.each_ref().map(value));
         self.lanes.push(Lanes(block.map(|path| f32::from(u8::from(path.is_some())))));
-        if kind == Kind::Straight {
-            let slope = plane(|p| p.velocity[1] / p.velocity[0]);
-            self.lanes.extend([slope, plane(|p| 0.5 * p.velocity[0])]);
-        } else {
-            self.lanes.extend([plane(|p| p.velocity[0]), plane(|p| p.velocity[1])]);
+        self.lanes.extend([plane(|p| p.velocity[0]), plane(|p| p.velocity[1])]);
+        if kind != Kind::Straight {
             self.lanes.extend([plane(|p| p.curvature[0]), plane(|p| p.curvature[1])]);
         }
-        if kind == Kind::Offset {
+        if offset {
             self.lanes.extend([plane(|p| p.offset[0]), plane(|p| p.offset[1])]);
         }
-        let (before, lanes) = (self.lines.len(), &self.lanes[record.lanes as usize..]);
+        record.planes = (self.lanes.len() - record.lanes as usize) as u8;
+        let (before, lanes) = (self.lines.len(), record.lanes_of(&self.lanes));
         let sums = match taps {
             Taps::Cubic => survey::<true>(&record, lanes, &mut self.lines),
             Taps::Linear => survey::<false>(&record, lanes, &mut self.lines),
@@ -168,11 +180,8 @@ impl RowPlan {
     }
 }
 
-/// The path of pixel (row y, column x), and whether its major axis is the vertical one; None: still, or unknown.
-fn path_of(paths: &MotionPaths, y: usize, x: usize) -> Option<(Parabola, bool)> {
-    let [u, v] = paths.velocity.view().at(y, x);
-    let bend = paths.curvature.view().at(y, x);
-    let shift = paths.offset.as_ref().map_or([0.0; 2], |offset| offset.view().at(y, x));
+/// The path of V = (u, v), q and d, and whether its major axis is the vertical one; None: still, or unknown.
+fn path_of([u, v]: [f32; 2], bend: [f32; 2], shift: [f32; 2]) -> Option<(Parabola, bool)> {
     let down = v.abs() > u.abs();
     let order = |[x, y]: [f32; 2]| if down { [y, x] } else { [x, y] };
     let [a, b] = order([u, v]);
@@ -193,13 +202,18 @@ fn path_of(paths: &MotionPaths, y: usize, x: usize) -> Option<(Parabola, bool)> 
 
 /// Sets the lines that weigh anything, and those inside of all paths.
 fn set_lines(record: &mut Record, paths: &[Parabola; LANES], reach: usize) {
-    let end = |i: usize| paths.iter().map(move |p| p.offset[0] + p.ends()[i]);
-    let least = |i: usize| end(i).fold(f32::INFINITY, f32::min);
-    let most = |i: usize| end(i).fold(f32::NEG_INFINITY, f32::max);
+    let (mut least, mut most) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for path in paths {
+        for (i, end) in path.ends().into_iter().enumerate() {
+            let end = path.offset[0] + end;
+            least[i] = if end < least[i] { end } else { least[i] };
+            most[i] = if end > most[i] { end } else { most[i] };
+        }
+    }
     let reach = reach as f32;
-    let first = (least(0) - reach).floor() as i16 + 1;
-    let last = (most(1) + reach).ceil() as i16 - 1;
-    record.inner = [(most(0) + reach).ceil() as i16, (least(1) - reach).floor() as i16 + 1];
+    let first = (least[0] - reach).floor() as i16 + 1;
+    let last = (most[1] + reach).ceil() as i16 - 1;
+    record.inner = [(most[0] + reach).ceil() as i16, (least[1] - reach).floor() as i16 + 1];
     record.first = if record.kind == Kind::Straight { 0 } else { first };
     record.count = (last - record.first + 1) as u16;
 }
@@ -208,9 +222,9 @@ fn set_lines(record: &mut Record, paths: &[Parabola; LANES], reach: usize) {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<Line>) -> Lanes {
     let mut sums = Lanes::ZERO;
-    let (mut weight, mut minor) = (Lanes::ZERO, Lanes::ZERO);
+    let prepared = Prepared::new::<CUBIC>(lanes);
     for i in 0..record.count {
-        line_of::<CUBIC>(record, lanes, i as i16, &mut weight, &mut minor);
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
         let twice = if record.kind == Kind::Straight { 2.0 } else { 1.0 };
         let (mut least, mut most) = (minor.0[0], minor.0[0]);
         for lane in 0..LANES {
@@ -224,31 +238,17 @@ fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<L
     sums
 }
 
-/// Weights, times the gain, and minor positions of the pixels on the line number `i` of a record.
+/// Weights and minor positions of the pixels on the line number `i` of a record that moves.
 #[inline(always)]
-pub(super) fn line_of<const CUBIC: bool>(
-    record: &Record,
-    lanes: &[Lanes],
-    i: i16,
-    weight: &mut Lanes,
-    minor: &mut Lanes,
-) {
+pub(super) fn line_of<const CUBIC: bool>(record: &Record, paths: &Prepared, i: i16) -> [Lanes; 2] {
     let line = record.first + i;
     let inner = record.inner[0] <= line && line < record.inner[1];
+    let line = f32::from(line);
     match (record.kind, inner) {
-        (Kind::Still, _) => (*weight, *minor) = (lanes[0], Lanes::ZERO),
-        (Kind::Straight, _) => straight_line::<CUBIC>(lanes, f32::from(line), inner, weight, minor),
-        (Kind::Curved, true) => {
-            curved_line::<CUBIC, true, false>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Curved, false) => {
-            curved_line::<CUBIC, false, false>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Offset, true) => {
-            curved_line::<CUBIC, true, true>(lanes, f32::from(line), weight, minor);
-        }
-        (Kind::Offset, false) => {
-            curved_line::<CUBIC, false, true>(lanes, f32::from(line), weight, minor);
-        }
+        (Kind::Still | Kind::Straight, _) => paths.straight::<CUBIC>(line, inner),
+        (Kind::Gentle, true) => paths.curved::<CUBIC, true, true>(line),
+        (Kind::Gentle, false) => paths.curved::<CUBIC, false, true>(line),
+        (Kind::Curved, true) => paths.curved::<CUBIC, true, false>(line),
+        (Kind::Curved, false) => paths.curved::<CUBIC, false, false>(line),
     }
 }

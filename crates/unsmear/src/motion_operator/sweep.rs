@@ -9,9 +9,8 @@
 
 use multiversion::multiversion;
 
-use super::Taps;
 use super::expand::{Expanded, expand};
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, Taps};
 use super::plan::{Kind, Record, RowPlan};
 
 /// Records scattered together: a write that a later read overlaps has by then left the processor's queue
@@ -126,7 +125,7 @@ fn gather(record: &Record, rows: &Expanded, x: &[f32], start: usize) -> Lanes {
     match record.kind {
         Kind::Still => lanes_at(&x[start..], record),
         Kind::Straight => gather_rows::<true>(rows, x, place),
-        Kind::Curved | Kind::Offset => gather_rows::<false>(rows, x, place),
+        Kind::Gentle | Kind::Curved => gather_rows::<false>(rows, x, place),
     }
 }
 
