@@ -59,9 +59,7 @@ def test_flips_and_transposition_go_through() -> None:
     restored = restore(image, flow, noise=0.01).image
     mirrored = flow[:, ::-1] * np.float32([-1, 1])
     across = restore(image[:, ::-1], mirrored, noise=0.01).image
-    turned = restore(
-        image.T, flow.transpose(1, 0, 2)[..., ::-1], noise=0.01
-    ).image
+    turned = restore(image.T, flow.transpose(1, 0, 2)[..., ::-1], noise=0.01).image
     # Rounding alone, through positions and kernels: far below any quantisation step.
     assert_allclose(across[:, ::-1], restored, atol=1e-9)
     assert_allclose(turned.T, restored, atol=1e-9)

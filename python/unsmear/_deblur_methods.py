@@ -96,7 +96,7 @@ def _believed_in_light(
 ) -> NDArray[np.float32]:
     """Return weights against noise that decoding made larger in bright pixels."""
     power = np.nan_to_num(np.mean(slope**2, axis=0), nan=spread**2)
-    believed = np.minimum(1.0, spread**2 / power).astype(np.float32)
+    believed = np.asarray(np.minimum(1.0, spread**2 / power), np.float32)
     return believed if weights is None else believed * weights
 
 
@@ -104,14 +104,14 @@ def _in_units(
     report: dict[str, Any], unit: float, strength_unit: float
 ) -> dict[str, Any]:
     """Return the core's report in the units of the picture, None for what is not."""
-    result = {
+    result: dict[str, Any] = {
         key: None if isinstance(value, float) and np.isnan(value) else value
         for key, value in report.items()
     }
     units = {"noise": unit, "residual": unit, "regularization": strength_unit}
     for key, scale in units.items():
-        if result[key] is not None:
-            result[key] *= scale
+        value = result[key]
+        result[key] = None if value is None else value * scale
     mismatch = result["mismatch"]
     result["model_mismatch"] = (
         mismatch is not None and mismatch > MISMATCH_WORTH_A_WARNING

@@ -35,7 +35,7 @@ class Tone:
         else:
             upper = ((size + _SHIFT) / (1 + _SHIFT)) ** _POWER
             light = np.where(size <= _LINE_END, size / _LINE, upper)
-        return np.copysign(light, code).astype(code.dtype)
+        return np.asarray(np.copysign(light, code), code.dtype)
 
     def code(self, light: NDArray[Any]) -> NDArray[Any]:
         """Return the code of ``light``; the inverse of `light`."""
@@ -45,7 +45,7 @@ class Tone:
         else:
             upper = (1 + _SHIFT) * size ** (1 / _POWER) - _SHIFT
             code = np.where(size <= _LINE_END / _LINE, size * _LINE, upper)
-        return np.copysign(code, light).astype(light.dtype)
+        return np.asarray(np.copysign(code, light), light.dtype)
 
     def slope(self, code: NDArray[Any]) -> NDArray[np.float64]:
         """Return d light / d code."""

@@ -144,8 +144,9 @@ def deblur(
     crosses a jump of the flow are not believed, clipped ones (white of integers) only
     as lower bounds, and unknown (NaN) ones not at all: what they would say of a pixel
     is taken from others that its light fell on, and where less than a quarter of it
-    fell on known pixels the result is NaN. Iterations couple all pixels; beyond a few
-    blur lengths the effect of an unknown pixel is far below a grey level.
+    fell on known pixels the result is NaN. Iterations couple all pixels, faintly: an
+    unknown pixel changes far ones by a grey level or so in fine texture, less elsewhere
+    ("wiener" keeps them bit for bit).
 
     Blur below 1/2 px is left alone bit for bit, fading in up to 1 px; beyond 200 px
     it is left alone too. "wiener" applies, along the streamline through p on which

@@ -115,7 +115,7 @@ impl MotionDeblur {
             count(|length| f64::from(length) > LONGEST_BLUR),
         ];
         let mut result = MotionResult {
-            images: blurred.channels.iter().map(|channel| channel.to_owned()).collect(),
+            images: blurred.channels.iter().map(ArrayView2::to_owned).collect(),
             noise: f64::NAN,
             regularization: f64::NAN,
             iterations: 0,

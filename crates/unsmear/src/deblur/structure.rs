@@ -47,7 +47,7 @@ impl Prior {
     /// Renews the weights of `smoothness` from the picture `channels`; `scratch` holds three planes, and afterwards
     /// nothing of meaning.
     pub(super) fn renew(
-        &self,
+        self,
         channels: &[Vec<f32>],
         smoothness: &mut Smoothness,
         scratch: [&mut Vec<f32>; 3],
@@ -172,7 +172,7 @@ mod tests {
     }
 
     /// The prior by its definition: gradients, window, trace of the root.
-    fn value(prior: &Prior, channels: &[Vec<f32>]) -> f64 {
+    fn value(prior: Prior, channels: &[Vec<f32>]) -> f64 {
         let (h, w) = SIZE;
         let clamp = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;
         let product = |y: usize, x: usize| {
@@ -232,7 +232,7 @@ mod tests {
                 let moved = |by: f32| {
                     let mut other = channels.clone();
                     other[0][i] += by;
-                    value(&prior, &other)
+                    value(prior, &other)
                 };
                 let slope = (moved(0.02) - moved(-0.02)) / 0.04;
                 // The mean over two channels halves the form's gradient; single precision and third derivatives.
