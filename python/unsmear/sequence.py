@@ -10,8 +10,9 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear._parameters import merged
+from unsmear.restoration.alternatives import Alternatives, better
 from unsmear.restoration.chain import Chain
-from unsmear.restoration.records import Restored, Settings
+from unsmear.restoration.records import Settings
 from unsmear.restoration.source import Source
 
 if TYPE_CHECKING:
@@ -181,6 +182,7 @@ def restored_frames(
         return planes[0] if len(planes) == 1 else np.moveaxis(planes, 0, -1)
 
     second = Chain(source, as_restored, settings)
+    others = Alternatives(source, as_given, settings)
     for index in wanted:
         result, chain, passes = first.restored(index), first, 1
         again = second_pass
@@ -188,8 +190,10 @@ def restored_frames(
             again = bool(result.changed.any()) and first.unsteadiness(index) > UNSTEADY
         if again:
             other = second.restored(index)
-            if _better(other, result):
+            if better(other, result):
                 result, chain, passes = other, second, 2
+        if result.report["exposure_status"] == "unsure" and result.changed.any():
+            result, chain = others.best(index, result, chain)
         picture = source.as_came(result.planes, index, result.changed)
         report = result.report | {
             "passes": passes,
@@ -202,10 +206,7 @@ def restored_frames(
         yield picture, chain.motion.motion(index).velocity, report
         first.forget_before(index - 5)
         second.forget_before(index)
-
-
-def _better(second: Restored, first: Restored) -> bool:
-    return bool(second.ratio < first.ratio) and bool(second.changed.any())
+        others.forget_before(index)
 
 
 def _settings(

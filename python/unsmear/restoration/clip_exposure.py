@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 __all__ = ["ClipExposure", "Exposure"]
 
-LIMITS = (0.35, 1.25)
+LIMITS = (0.35, 2.0)
+LONGEST = 1.25
+"""No shutter is open for more than 1; flow too short by a fifth is nothing unusual."""
 POOLED = 1
 SMOOTHED = 2
 LEAST_SPREAD = 0.02
-LEAST_VOTE, GREATEST_SPREAD = 0.6, 0.12
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Exposure:
     value : float
         Share of the frame interval.
     status : {"given", "ok", "unsure", "small", "beyond"}
-        "beyond": what was found is nothing that a shutter does.
+        "beyond": longer than a shutter makes it, so the flow is wrong at least.
     noise : float
         Standard deviation of the noise, grey levels.
     found : dict
@@ -111,8 +112,6 @@ class ClipExposure:
             value, status = own["value"], own["status"]
             if status == "ok":
                 value, status = min(value, 1.0), "unsure"
-            elif _beyond(own):
-                status = "beyond"
             return Exposure(float(value), status, own["noise"], own)
         weights = [
             (1 - abs(j - index) / (SMOOTHED + 1))
@@ -121,13 +120,8 @@ class ClipExposure:
         ]
         logs = [np.log(self._found(j)["value"]) for j in trusted]
         value = float(np.exp(np.average(logs, weights=weights)))
-        return Exposure(value, "ok", own["noise"], own)
-
-
-def _beyond(found: dict[str, Any]) -> bool:
-    """Return whether the blur is surely longer, or shorter, than the limits allow."""
-    agreed = found["vote"] >= LEAST_VOTE and found["spread"] <= GREATEST_SPREAD
-    return bool(agreed and not LIMITS[0] <= found["likeliest"] <= LIMITS[1])
+        status = "ok" if value <= LONGEST else "beyond"
+        return Exposure(value, status, own["noise"], own)
 
 
 def _stack(fields: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Verdict", "judge"]
 
-LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.1, "unsure": 0.98, "beyond": 0.0}
+LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.1, "unsure": 0.98, "beyond": 0.9}
 LOCAL_SMOOTHING = 12.0
 REGION_SHARE = 0.5
 LOCAL_LIMIT = (1.15, 1.3)
@@ -136,9 +136,8 @@ def _words(
             f"left as is: restored frames disagree (ratio {ratio:.2f}, at most {limit})"
         )
         if status == "beyond":
-            text = (
-                "left as is: the blur is longer or shorter than any shutter makes it; "
-                "flow or model must be wrong"
+            text += (
+                " and the blur is longer than a shutter makes it: flow must be wrong"
             )
         elif status == "unsure":
             text += " and the exposure could not be found with certainty"

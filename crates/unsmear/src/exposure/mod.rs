@@ -162,14 +162,13 @@ impl ExposureSearch {
             (least, most) = (least.min(s), most.max(s));
         });
         let rounding = ((most - least) / GREY_LEVELS / 12f64.sqrt()).max(0.0);
-        let noise = match self.noise {
-            Some(noise) => noise,
-            None => {
-                let of_frame = |frame: &ExposureFrame<'_, T>| {
-                    estimate_noise(&frame.image, &frame.velocity, 1.0, control)
-                };
-                median(frames.iter().map(of_frame).collect::<Result<Vec<_>>>()?)
-            }
+        let noise = if let Some(noise) = self.noise {
+            noise
+        } else {
+            let of_frame = |frame: &ExposureFrame<'_, T>| {
+                estimate_noise(&frame.image, &frame.velocity, 1.0, control)
+            };
+            median(frames.iter().map(of_frame).collect::<Result<Vec<_>>>()?)
         };
         Ok(noise.max(rounding))
     }

@@ -120,11 +120,9 @@ mod tests {
             FlowField::new(Array2::from_elem(shape, 4.0), Array2::from_elem(shape, 1.0)).unwrap();
         let paths = MotionPaths::new(&flow, 1.0, None).unwrap();
         let pad = paths.reach() + 2;
-        let sharp =
-            Array2::from_shape_fn(
-                shape,
-                |(y, x)| if (x / 5 + y / 7) % 2 == 0 { 20.0 } else { 90.0 },
-            );
+        let sharp = Array2::from_shape_fn(shape, |(y, x)| {
+            if (x / 5 + y / 7).is_multiple_of(2) { 20.0 } else { 90.0 }
+        });
         let look = Look {
             paths,
             planes: vec![sharp.view()],
