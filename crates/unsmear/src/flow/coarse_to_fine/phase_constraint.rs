@@ -6,15 +6,14 @@
 //! ```text
 //! G.d + D = 0,   G = k (grad phi_0 + grad phi_1)/2   rad/px,   D = arg(conj(R_0) R_1)   rad
 //! grad phi = Im(conj(R) R')/(|R|^2 + e) + k_j,   R' = (R(+1) e^{-i k_j} - R(-1) e^{i k_j})/2
-//! W = w A/(A + r^2) q^4/(1 + t^4),   A = a_0 a_1,   q = 2A/(a_0^2 + a_1^2)
+//! W = w A/(A + r^2) q^2/(1 + t^4),   A = a_0 a_1,   q = 2A/(a_0^2 + a_1^2)
 //! t = max |grad phi - k_j|^2/(tau sigma_k)^2 over the two frames
 //! ```
 //!
 //! with the frame's weight `w` (0 where it cannot be seen), the amplitude floor `r` and the
 //! deviation `sigma_k = 1/sigma` of the filters' spectrum. The demodulated three-point derivative is
 //! exact on the filter's own wave, one-sided at the edge; what it errs elsewhere, the next warp
-//! sees again. `q` is 1 where both frames have the same contrast: its fourth power silences what one of
-//! them hardly shows (occluded, saturated), and takes a fifth from a change of light by a third. A constraint that is not finite, or farther off its frequency than `t = 16`, weighs 0.
+//! sees again. A constraint that is not finite, or farther off its frequency than `t = 16`, weighs 0.
 //!
 //! Differs from [`crate::flow::constraint`], the form for one scale without warping, in the shorter
 //! derivative and in `w`. Source: Fleet & Jepson 1990 (doi 10.1007/BF00056772), sections 3 and 4.
@@ -201,10 +200,8 @@ fn constraint(filter: &Filter, one: &Cross, other: &Cross) -> [f32; TERMS] {
     let both = (p * q).sqrt();
     let sum = p + q + SUM_FLOOR;
     let steady = off * off;
-    let alike = both / sum;
-    let square = alike * alike;
-    let weight =
-        16.0 * both * square * square / ((both + filter.weighting.floor) * (1.0 + steady * steady));
+    let weight = 4.0 * both * both * both
+        / ((both + filter.weighting.floor) * sum * sum * (1.0 + steady * steady));
     // Not only weightless: what is not finite must not reach the sums.
     let kept = off < FARTHEST && weight > 0.0;
     let select = |value: f32| if kept { value } else { 0.0 };
@@ -252,7 +249,7 @@ mod tests {
         responses
     }
 
-    /// `G = k_j`, `D` the phase and `W = w A/(A + r^2) q^4`, at the edges too; without a neighbour along an axis the
+    /// `G = k_j`, `D` the phase and `W = w A/(A + r^2) q^2`, at the edges too; without a neighbour along an axis the
     /// derivative reads the tuned frequency, which here is the truth.
     #[test]
     fn terms_of_plane_waves_are_exact_up_to_the_edge() {
@@ -265,7 +262,7 @@ mod tests {
             let rule = Weighting { floor: 4.5, narrowness: 1.0 };
             constrain(&bank, [&pair[0], &pair[1]], &seen, 2.0, rule, &mut out, &control).unwrap();
             // A = 18, q = 36/45.
-            let weight = 0.5 * 18.0 / (18.0 + 4.5) * 0.64 * 0.64;
+            let weight = 0.5 * 18.0 / (18.0 + 4.5) * 0.64;
             for (row, terms) in out.chunks(TERMS * width).enumerate() {
                 let [kx, ky] = bank.wavevectors()[row % 4];
                 for x in 0..width {
