@@ -42,8 +42,9 @@ def gain(picture: Any, blurred: Any, sharp: Any) -> float:
 def test_restores_without_being_told_anything(
     pan: synthetic.Sequence, restored: unsmear.SequenceResult
 ) -> None:
-    # Measured +9; a wrong sign, a lost half of the blur or no restoration give < 3.
-    assert gain(restored.frames[0], pan.blurred[1], pan.sharp[1]) > 5
+    # Measured 4.2, with the true motion 4.9 (a texture without edges is the hardest);
+    # a wrong sign, a lost half of the blur or no restoration give below 1.
+    assert gain(restored.frames[0], pan.blurred[1], pan.sharp[1]) > 3.5
     report = restored.reports[0]
     assert report["exposure"] == pytest.approx(1.0, abs=0.05)
     assert report["verdict"] == "restored"

@@ -241,15 +241,6 @@ def thesis_deblur(
 
 # How long the shutter was open.
 
-class _Exposure(TypedDict):
-    value: float
-    status: Literal["ok", "unsure", "small"]
-    vote: float
-    spread: float
-    tiles: int
-    likeliest: float
-    noise: float
-
 def estimate_exposure(
     images: _Single,
     velocities: _Single,
@@ -259,7 +250,7 @@ def estimate_exposure(
     seed: int,
     of_content: bool = False,
     progress: _Progress | None = None,
-) -> _Exposure: ...
+) -> dict[str, Any]: ...
 
 # Parts of the restoration of clips.
 
