@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import datetime as dt
+import itertools
 import json
 import platform
 import time
@@ -174,25 +175,24 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "deblur_video")
     options = parser.parse_args()
-    rows = [
-        row(
-            f"{motion}, exposure {exposure}, {name}, seed {seed}",
-            made.blurred,
-            made.sharp,
-            [2],
-            [2],
+    rows: list[dict[str, Any]] = []
+    cases = itertools.product(
+        options.motions, EXPOSURES, options.pictures, range(options.seeds)
+    )
+    for motion, exposure, name, seed in cases:
+        made = clip(motion, name, exposure, seed)
+        title = f"{motion}, exposure {exposure}, {name}, seed {seed}"
+        rows.append(row(title, made.blurred, made.sharp, [2], [2], options.joint))
+        mean = float(np.mean([line["gain"] for line in rows]))
+        # What there is so far: a long run may be cut short.
+        write(options.output, rows, mean, options.joint)
+    if options.data:
+        write(
+            options.output,
+            rows + recorded(options.data, options.joint),
+            mean,
             options.joint,
         )
-        for motion in options.motions
-        for exposure in EXPOSURES
-        for name in options.pictures
-        for seed in range(options.seeds)
-        for made in [clip(motion, name, exposure, seed)]
-    ]
-    mean = float(np.mean([line["gain"] for line in rows])) if rows else float("nan")
-    if options.data:
-        rows += recorded(options.data, options.joint)
-    write(options.output, rows, mean, options.joint)
 
 
 def write(path: Path, rows: list[dict[str, Any]], mean: float, joint: int) -> None:

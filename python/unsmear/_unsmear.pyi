@@ -24,19 +24,26 @@ __all__ = [
     "coarse_to_fine",
     "component_velocities",
     "correlate_separable",
+    "dilated",
     "error_map",
+    "estimate_exposure",
     "estimate_noise",
     "fleet_jepson",
+    "frame_motion",
     "fspecial_motion",
     "gabor_phase_gradient",
     "gabor_planes",
     "get_num_threads",
     "least_squares",
+    "looks_reach",
     "motion_deblur_f32",
     "motion_deblur_f64",
     "motion_psf",
     "optimized",
     "psnr",
+    "record_look",
+    "regions",
+    "restore_looks",
     "sample",
     "set_num_threads",
     "ssim",
@@ -45,6 +52,7 @@ __all__ = [
     "thesis_flow",
     "thesis_gated_mean",
     "thesis_stages",
+    "visibility",
     "wiener_f32",
     "wiener_f64",
 ]
@@ -241,15 +249,6 @@ def thesis_deblur(
 
 # How long the shutter was open.
 
-class _Exposure(TypedDict):
-    value: float
-    status: Literal["ok", "unsure", "small"]
-    vote: float
-    spread: float
-    tiles: int
-    likeliest: float
-    noise: float
-
 def estimate_exposure(
     images: _Single,
     velocities: _Single,
@@ -259,7 +258,7 @@ def estimate_exposure(
     seed: int,
     of_content: bool = False,
     progress: _Progress | None = None,
-) -> _Exposure: ...
+) -> dict[str, Any]: ...
 
 # Parts of the restoration of clips.
 
