@@ -21,7 +21,7 @@ const SHARP: Prior = Prior { rounding: 1.0, power: Power::Half };
 /// Where the first restoration starts.
 const START: Effort = Effort { half: (5, 12), full: (1, 12) };
 
-/// Strengths and effort; see the [module](self).
+/// A picture restored with growing strength of the prior: strengths and effort.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walk {
     /// lambda of each restoration, grey levels, > 0, rising.
