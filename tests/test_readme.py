@@ -9,7 +9,20 @@ import unsmear
 from unsmear import blur, component_velocity, deblur, demo_clip, flow  # noqa: F401
 
 ROOT = Path(__file__).parent.parent
-MODULES = ("flow", "deblur", "blur", "psf", "demo_clip", "plot", "metrics")
+MODULES = (
+    "blur",
+    "deblur",
+    "demo_clip",
+    "exposure",
+    "flow",
+    "metrics",
+    "motion_operator",
+    "motions",
+    "noise",
+    "plot.flow_pictures",
+    "psf",
+    "sequence",
+)
 
 
 def test_python_blocks_of_the_readme_run(capsys: pytest.CaptureFixture[str]) -> None:
