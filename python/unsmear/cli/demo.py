@@ -50,7 +50,11 @@ def run(options: argparse.Namespace) -> None:
         whole = deblur_sequence(clip.blurred, channel_axis=3, progress=bar)
     restored = whole.frames
     middle = len(clip.blurred) // 2
-    flow = optical_flow(clip.blurred, index=middle, channel_axis=3)
+    measured = [
+        optical_flow(clip.blurred, index=index, channel_axis=3)
+        for index in range(len(clip.blurred) - 1)
+    ]
+    flow = measured[middle]
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)
     write_frames(folder / "deblurred", restored)
@@ -78,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
     report = plain_data({**result, "flow": flow.report, "frames": whole.reports})
     text = json.dumps(report, indent=2, allow_nan=False)
     write_bytes_atomic(folder / "report.json", text.encode())
-    _write_page(folder / "report.html", clip, flow, whole, report)
+    _write_page(folder / "report.html", clip, measured, whole, report)
     result["written"] = [str(folder / name) for name in _WRITTEN]
     _common.show_result(result, as_json=options.json)
 
@@ -86,24 +90,19 @@ def run(options: argparse.Namespace) -> None:
 def _write_page(
     path: Path,
     clip: DemoClip,
-    flow: FlowResult,
+    measured: list[FlowResult],
     whole: SequenceResult,
     report: dict[str, Any],
 ) -> None:
-    count = len(clip.blurred)
-    middle = count // 2
-    of_middle: list[Any] = [None] * count
-    flows, confidences, truths = list(of_middle), list(of_middle), list(of_middle)
-    flows[middle], confidences[middle] = flow.flow, flow.confidence
-    truths[middle] = clip.flow[middle]
+    # The last frame has no next one to move to.
     plot.report(
         path,
         clip.blurred,
         restored=whole.frames,
-        flows=flows,
-        confidences=confidences,
+        flows=[*(each.flow for each in measured), None],
+        confidences=[*(each.confidence for each in measured), None],
         sharp=clip.sharp,
-        true_flows=truths,
+        true_flows=list(clip.flow),
         exposure=clip.exposure,
         verdicts=sorted({str(frame["verdict"]) for frame in whole.reports}),
         parameters=report,
