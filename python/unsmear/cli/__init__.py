@@ -7,6 +7,7 @@ Exit status: 0 good, 1 failed (the reason is on standard error), 2 wrong usage. 
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,9 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
-    options = parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    options = parser().parse_args(given)
+    options.command = shlex.join(["unsmear", *given])
     try:
         options.run(options)
     except KeyboardInterrupt:

@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
             restored, flows, reports = _frame_by_frame(options, frames, bar)
     write_frames(options.output, restored)
     if options.report:
-        _write_report(options.report, frames, restored, flows, reports)
+        _write_report(options, frames, restored, flows, reports)
     warnings = {text for report in reports for text in report.get("warnings", [])}
     result: dict[str, Any] = {
         "frames": len(frames),
@@ -162,13 +162,14 @@ def _flow_of(
 
 
 def _write_report(
-    path: str,
+    options: argparse.Namespace,
     frames: NDArray[Any],
     restored: NDArray[Any],
     flows: list[NDArray[np.float32]],
     reports: list[dict[str, Any]],
 ) -> None:
     """Write the reports: all of them as JSON, or a page to look at."""
+    path = options.report
     if path.endswith(".json"):
         text = json.dumps(plain_data(reports), indent=2, allow_nan=False)
         write_bytes_atomic(path, text.encode())
@@ -186,5 +187,6 @@ def _write_report(
             if text
         ],
         parameters={"frames": plain_data(reports)},
+        command=options.command,
         title="unsmear deblur",
     )
