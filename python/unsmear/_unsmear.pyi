@@ -88,6 +88,7 @@ def coarse_to_fine(
     mask: NDArray[np.bool_] | None = None,
     progress: _Progress | None = None,
 ) -> tuple[_Single, _Single, list[tuple[int, int, int, list[float], float, float]]]: ...
+
 # float32 out, or float64 where `double` is asked for.
 def least_squares(
     frames: _Double,
