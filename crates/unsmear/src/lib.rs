@@ -14,15 +14,16 @@
 //! | 5 | `sor::layout`, `weighted_median::window` | |
 //! | 6 | `sor::relax` | |
 //! | 7 | [`sor`], [`weighted_median`] | solver of the default flow; median with weights |
-//! | 5 | [`pyramid`] | sizes of pictures |
+//! | 5 | `halving` | half the size |
+//! | 6 | [`pyramid`] | sizes of pictures |
 //! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
 //! | 6 | `gabor::respond` | its passes |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
 //! | 7 | [`phase_gradient`] | phase in space |
 //! | 8 | [`component_velocity`] | what one filter sees of the motion |
-//! | 8 | [`flow`], [`flow::thesis::bank`] | an estimate of flow, with confidence; the founding filters |
+//! | 8 | [`flow`], [`flow::thesis::bank`], `flow::coarse_to_fine::recorded`, `flow::coarse_to_fine::exponential`, `flow::coarse_to_fine::rows` | an estimate of flow, with confidence; the founding filters; frames as they come; parts of the default flow |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
-//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::rows`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible` | parts of the default flow |
+//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible` | parts of the default flow |
 //! | 10 | `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
 //! | 11 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still`, `flow::coarse_to_fine::precision`, `flow::coarse_to_fine::confidence`, `flow::coarse_to_fine::round_trip` | |
 //! | 12 | `flow::coarse_to_fine::level` | one scale |
@@ -79,6 +80,7 @@ pub mod flow;
 pub mod flow_field;
 pub mod fourier;
 pub mod gabor;
+mod halving;
 pub mod immerkaer_noise;
 pub mod interpolate;
 pub mod kernel_operator;

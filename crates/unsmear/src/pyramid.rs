@@ -22,6 +22,7 @@ use crate::array::for_each_row_with;
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
+use crate::halving::smooth_and_halve;
 use crate::real::Real;
 pub use crate::smoothing::smooth;
 
@@ -133,8 +134,13 @@ pub fn pyramid<T: Real>(
     let kind = if halving { Resampling::Linear } else { Resampling::Cubic };
     let mut levels = vec![picture];
     for &size in sizes.iter().skip(1) {
-        let smoothed = smooth(levels[levels.len() - 1].view(), sigma, control)?;
-        levels.push(resample(smoothed.view(), size, kind, control)?);
+        let last = levels[levels.len() - 1].view();
+        let smaller = if halving && last.dim() == (2 * size.0, 2 * size.1) {
+            smooth_and_halve(last, sigma, control)?
+        } else {
+            resample(smooth(last, sigma, control)?.view(), size, kind, control)?
+        };
+        levels.push(smaller);
     }
     Ok(levels)
 }

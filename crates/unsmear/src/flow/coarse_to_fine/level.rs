@@ -11,7 +11,9 @@
 //! The warped picture is filtered, not the responses warped: the phase of a response turns with the
 //! flow's gradient, and only so do both frames see the same neighbourhood.
 
+use multiversion::multiversion;
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use super::choice::{Explanation, Mismatch, mismatch};
 use super::confidence::add_coherence;
@@ -25,6 +27,9 @@ use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::gabor::{GaborBank, Responses};
 use crate::interpolate::{SplineDegree, SplineImage};
+
+/// Sums side by side within a line.
+const LANES: usize = 16;
 
 /// What the refinement depends on, the same at every level.
 #[derive(Debug, Clone)]
@@ -244,11 +249,30 @@ fn wavenumber(bank: &GaborBank<f32>) -> f64 {
 /// Mean of the squared amplitude over pixels and filters.
 fn mean_power(responses: &Responses<f32>) -> f64 {
     let (filters, height, width) = responses.dim();
-    let mut sum = 0.0;
-    for (y, filter) in (0..height).flat_map(|y| (0..filters).map(move |j| (y, j))) {
-        let (re, im) = responses.row(filter, y);
-        let row: f32 = re.iter().zip(im).map(|(re, im)| re * re + im * im).sum();
-        sum += f64::from(row);
+    let row = |y: usize| -> f64 {
+        let of_filter = |j: usize| {
+            let (re, im) = responses.row(j, y);
+            f64::from(power(re, im))
+        };
+        (0..filters).map(of_filter).sum()
+    };
+    let mut rows = vec![0.0; height];
+    rows.par_iter_mut().with_min_len(64).enumerate().for_each(|(y, sum)| *sum = row(y));
+    rows.iter().sum::<f64>() / (filters * height * width) as f64
+}
+
+/// Sum of squares of two lines, in lanes.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn power(re: &[f32], im: &[f32]) -> f32 {
+    let mut sums = [0.0; LANES];
+    for line in [re, im] {
+        let (blocks, rest) = line.as_chunks::<LANES>();
+        for block in blocks {
+            for lane in 0..LANES {
+                sums[lane] += block[lane] * block[lane];
+            }
+        }
+        rest.iter().zip(&mut sums).for_each(|(s, sum)| *sum += s * s);
     }
-    sum / (filters * height * width) as f64
+    sums.iter().sum()
 }

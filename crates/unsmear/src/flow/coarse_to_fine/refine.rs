@@ -18,6 +18,7 @@
 //! for warping with lagged weights; D. Sun, S. Roth, M. J. Black 2014 (doi
 //! 10.1007/s11263-013-0644-x) for the medians.
 
+use multiversion::multiversion;
 use ndarray::Array2;
 
 use super::boundary::boundaries;
@@ -41,6 +42,9 @@ const RELAXATION: f32 = 1.9;
 const BOUNDARY: f32 = 0.1;
 /// Spatial deviation of the weighted median, in radii.
 const MEDIAN_SPREAD: f32 = 0.8;
+
+/// Sums side by side within a row.
+const LANES: usize = 16;
 
 /// What a level adds: the flow, and the data terms of its last warp.
 pub(super) struct Refined {
@@ -78,10 +82,16 @@ impl Level<'_> {
             control.advance()?;
         }
         let Work { equations, springs, gain, .. } = work;
-        let trace = Array2::from_shape_fn((self.height, self.width), |(y, x)| {
-            let i = y * self.width + x;
-            (equations.a11[i] + equations.a22[i]) / gain[i] - 2.0 * springs[i]
-        });
+        let mut trace = Array2::zeros((self.height, self.width));
+        let plane = trace.as_slice_mut().unwrap_or_default();
+        for_each_rows([plane], [self.width], control, |y, [trace]| {
+            let row = y * self.width..(y + 1) * self.width;
+            let [a11, a22, gain, springs] =
+                [&equations.a11, &equations.a22, &gain, &springs].map(|p| &p[row.clone()]);
+            for (x, trace) in trace.iter_mut().enumerate() {
+                *trace = (a11[x] + a22[x]) / gain[x] - 2.0 * springs[x];
+            }
+        })?;
         Ok(Refined { flow: self.sharpen(flow, control)?, equations, trace, changes })
     }
 
@@ -130,15 +140,15 @@ impl Level<'_> {
             };
             solve(&system, &mut u, &mut v, RELAXATION, sweeps, &mut work.sor, control)?;
         }
-        let mut change = 0.0;
-        for (component, start) in [(&mut u, start_u), (&mut v, start_v)] {
-            for (new, &old) in component.iter_mut().zip(&*start) {
-                let increment = (*new - old).clamp(-LARGEST_INCREMENT, LARGEST_INCREMENT);
-                change += f64::from(increment.abs());
-                *new = old + increment;
-            }
-            median_5x5(component, self.height, self.width, start, control)?;
-        }
+        let mut sums = vec![0.0; self.height];
+        let planes = [&mut u[..], &mut v[..], &mut sums[..]];
+        for_each_rows(planes, [self.width, self.width, 1], control, |y, [u, v, sum]| {
+            let row = y * self.width..(y + 1) * self.width;
+            sum[0] = limit(u, &start_u[row.clone()]) + limit(v, &start_v[row]);
+        })?;
+        median_5x5(&u, self.height, self.width, start_u, control)?;
+        median_5x5(&v, self.height, self.width, start_v, control)?;
+        let change: f64 = sums.iter().map(|&sum| f64::from(sum)).sum();
         Ok(change / (self.height * self.width) as f64)
     }
 
@@ -199,6 +209,20 @@ impl Work {
             sor: SorScratch::default(),
         }
     }
+}
+
+/// Limits the increments of a row from `old` to `new`; returns the sum of their sizes, px.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn limit(new: &mut [f32], old: &[f32]) -> f32 {
+    let mut sums = [0.0; LANES];
+    for (new, old) in new.chunks_mut(LANES).zip(old.chunks(LANES)) {
+        for lane in 0..new.len() {
+            let increment = (new[lane] - old[lane]).clamp(-LARGEST_INCREMENT, LARGEST_INCREMENT);
+            sums[lane] += increment.abs();
+            new[lane] = old[lane] + increment;
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Adds the springs, which act on the matrix alone as their rest is 0, and multiplies all by the gain.

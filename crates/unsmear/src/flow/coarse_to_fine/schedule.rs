@@ -155,8 +155,9 @@ pub(super) fn enlarge(
         return Ok(FlowField { u: Array2::zeros(size), v: Array2::zeros(size) });
     }
     let larger = |component: &Array2<f32>, to: usize, from: usize| -> Result<Array2<f32>> {
-        let resampled = resample(component.view(), size, Resampling::Linear, control)?;
-        Ok(resampled * (to as f32 / from as f32))
+        // Before they are many.
+        let scaled = component * (to as f32 / from as f32);
+        resample(scaled.view(), size, Resampling::Linear, control)
     };
     Ok(FlowField { u: larger(&flow.u, size.1, width)?, v: larger(&flow.v, size.0, height)? })
 }

@@ -19,9 +19,12 @@
 //! A fine pattern that moves by its own period looks still. The next levels, coarser by up to
 //! [`WITNESSES`], see another pattern there: the spring takes the least of their `exp`.
 
+use multiversion::multiversion;
 use ndarray::{Array2, Zip};
 
+use super::exponential::falling;
 use super::phase_constraint::TERMS;
+use super::rows::for_each_rows;
 use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
@@ -79,14 +82,27 @@ pub(super) fn look_for_rest(
             }
         })?;
     }
-    let motion = smooth(motion.view(), SIGMA, control)?;
-    let pattern = smooth(pattern.view(), SIGMA, control)?;
+    let mut rest = smooth(motion.view(), SIGMA, control)?;
+    let mut pattern = smooth(pattern.view(), SIGMA, control)?;
     let least = (VISIBLE * wavenumber).powi(2) as f32 * floor;
-    let rest = Zip::from(&motion).and(&pattern).map_collect(|n, g| {
-        let rho = zoom * zoom * n / (g + least) / STILLNESS;
-        (-rho * rho).exp()
-    });
-    Ok(Rest { pattern: pattern.mapv(|g| g / (g + least)), rest })
+    let planes = [&mut rest, &mut pattern].map(|p| p.as_slice_mut().unwrap_or_default());
+    for_each_rows(planes, [width; 2], control, |_, [rest, pattern]| {
+        judge(rest, pattern, least, zoom * zoom / STILLNESS);
+    })?;
+    Ok(Rest { pattern, rest })
+}
+
+/// `E_n, E_g` on a row to the exponential and `E_g/(E_g + r_0)`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn judge(motion: &mut [f32], pattern: &mut [f32], least: f32, scale: f32) {
+    let n = motion.len();
+    let pattern = &mut pattern[..n];
+    for x in 0..n {
+        let inverse = 1.0 / (pattern[x] + least);
+        let rho = scale * motion[x] * inverse;
+        motion[x] = falling(rho * rho);
+        pattern[x] *= inverse;
+    }
 }
 
 /// Spring of a level from its own `Rest` and the exponentials of coarser levels with their `zoom`.
