@@ -128,14 +128,14 @@ def optical_flow(
         ``forward_backward=False`` (lower the confidence where the flow of the reversed
         frames does not lead back: ranks errors 2 % better at twice the time).
 
-        "fast" differs by ``finest_level=1``, ``warps=5``; "accurate" by
-        ``pyramid_factor=0.75``, ``warps=3``, ``passes=3``, ``sweeps=15``,
+        "fast" differs by ``finest_level=1``, ``warps=5``, ``finest_warps=3``;
+        "accurate" by ``pyramid_factor=0.75``, ``warps=3``, ``passes=3``, ``sweeps=15``,
         ``smoothness=0.13``, ``edge_sensitivity=2.5``, ``strongest_channel=True``,
         ``residual_scale=0.7``; "steady" by ``smoothness=0.08``,
         ``edge_sensitivity=1.0``, ``residual_scale=0.5``, ``frames_each_side=3``,
         ``choose_frames=True``; "steady-accurate" from "accurate" by
-        ``smoothness=0.104``, ``edge_sensitivity=1.25``, ``residual_scale=0.35`` and
-        the frames of "steady".
+        ``smoothness=0.104``, ``edge_sensitivity=1.25``, ``residual_scale=0.35`` and the
+        frames of "steady".
 
         The others have ``tuning_frequency`` (cycles/px, in (0, 0.5)) and
         ``bandwidth_octaves``.

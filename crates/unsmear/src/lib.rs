@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | 0 | [`error`], [`real`] | failures; `f32` and `f64` |
 //! | 1 | [`border`], [`control`], [`flow_field`] | picture edges; cancellation; a field of motion |
-//! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
+//! | 2 | `array`, `awake`, [`fourier`] | shape checks, rows in parallel; threads that do not sleep; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
 //! | 4 | `smoothing`, `spline_filter`, `spline_values`, [`median`], [`immerkaer_noise`] | Gaussian; splines; median; noise |
@@ -64,6 +64,7 @@
 #![deny(unsafe_code)]
 
 mod array;
+mod awake;
 pub mod blur;
 pub mod border;
 pub mod component_tests;

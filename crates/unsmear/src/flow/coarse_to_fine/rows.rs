@@ -5,6 +5,7 @@
 
 use rayon::prelude::*;
 
+use crate::array::FEW;
 use crate::control::Control;
 use crate::error::Result;
 
@@ -24,6 +25,8 @@ pub(super) fn for_each_rows<const N: usize>(
     control: &Control,
     row: impl Fn(usize, [&mut [f32]; N]) + Sync,
 ) -> Result<()> {
+    // Few samples are not worth a second thread.
+    let least = if planes[0].len() <= FEW { usize::MAX } else { 1 };
     let mut tasks: Vec<[&mut [f32]; N]> = Vec::new();
     let mut rest = planes;
     while rest.iter().zip(widths).all(|(plane, width)| width > 0 && !plane.is_empty()) {
@@ -38,7 +41,7 @@ pub(super) fn for_each_rows<const N: usize>(
         });
         tasks.push(task);
     }
-    tasks.into_par_iter().enumerate().try_for_each(|(number, mut planes)| {
+    tasks.into_par_iter().with_min_len(least).enumerate().try_for_each(|(number, mut planes)| {
         let rows = planes[0].len() / widths[0];
         for i in 0..rows {
             control.check()?;

@@ -14,6 +14,7 @@ use super::evidence::gather;
 use super::frames::FramePyramid;
 use super::level::{Level, Settings};
 use super::still::spring;
+use crate::awake::awake;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -118,7 +119,7 @@ impl Climb<'_> {
         Ok(Summit { flow, confidence, evidence, levels })
     }
 
-    /// Prepares a level and hands it to `work`.
+    /// Prepares a level and hands it to `work`, all threads awake.
     pub(super) fn at<R>(
         &self,
         level: usize,
@@ -126,14 +127,16 @@ impl Climb<'_> {
         control: &Control,
         work: impl FnOnce(&Level<'_>) -> Result<R>,
     ) -> Result<R> {
-        let sigma = self.settings.bank.sigma();
-        let here = self.reference.at(level, sigma, control)?;
-        let others = others
-            .iter()
-            .map(|frame| frame.at(level, sigma, control))
-            .collect::<Result<Vec<_>>>()?;
-        let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
-        work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
+        awake(|| {
+            let sigma = self.settings.bank.sigma();
+            let here = self.reference.at(level, sigma, control)?;
+            let others = others
+                .iter()
+                .map(|frame| frame.at(level, sigma, control))
+                .collect::<Result<Vec<_>>>()?;
+            let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
+            work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
+        })
     }
 }
 
