@@ -31,10 +31,12 @@ use crate::real::Real;
 mod parameters;
 mod respond;
 mod responses;
+mod stream;
 mod taps;
 
 pub use parameters::GaborParameters;
 pub use responses::Responses;
+pub(crate) use stream::ResponseRows;
 use taps::{EvenOdd, wavevector};
 
 /// Planned filters; see the [module](self). Build once, run on many pictures.

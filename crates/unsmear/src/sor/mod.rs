@@ -26,11 +26,11 @@ mod system;
 use rayon::prelude::*;
 
 use crate::control::Control;
-use crate::error::{Result, require};
+use crate::error::{Error, Result, require};
 use layout::{LANES, Layout};
 use relax::{Band, relax_band};
 
-pub use system::SorSystem;
+pub use system::{SorSystem, SystemRows};
 
 /// Half-sweeps per pass: 11 rows of 640 px are 260 kB, well inside a second-level cache.
 const HALVES_PER_PASS: usize = 10;
@@ -61,11 +61,33 @@ pub fn solve(
     control: &Control,
 ) -> Result<()> {
     system.check(u, v)?;
+    solve_rows(system, [system.height, system.width], u, v, omega, sweeps, scratch, control)
+}
+
+/// Like [`solve`], with equations made row by row for a picture of `[height, width]`.
+///
+/// # Errors
+/// [`Error::Shape`](crate::Error::Shape) when `u` or `v` has not height x width samples; else as [`solve`].
+pub fn solve_rows(
+    system: &impl SystemRows,
+    [height, width]: [usize; 2],
+    u: &mut [f32],
+    v: &mut [f32],
+    omega: f32,
+    sweeps: usize,
+    scratch: &mut SorScratch,
+    control: &Control,
+) -> Result<()> {
+    for (argument, got) in [("u", u.len()), ("v", v.len())] {
+        if got != height * width {
+            return Err(Error::shape(argument, format!("({height} x {width},)"), &[got]));
+        }
+    }
     require("omega", f64::from(omega), "in (0, 2)", |o| 0.0 < o && o < 2.0)?;
     if u.is_empty() || sweeps == 0 {
         return Ok(());
     }
-    let layout = Layout::new(system.height, system.width);
+    let layout = Layout::new(height, width);
     let SorScratch { layout: former, coefficients, field } = scratch;
     if *former != layout {
         // Padding is zero and stays so.

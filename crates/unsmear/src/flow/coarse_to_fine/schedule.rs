@@ -69,24 +69,21 @@ impl Climb<'_> {
         let (mut evidence, mut trust) = (None, None);
         let (mut resting, mut levels) = (Vec::new(), Vec::new());
         for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
-            flow = enlarge(&flow, size, control)?;
-            self.at(level, others, control, |prepared| {
+            // Not the enlarged flow but the small one is kept for the comparison at the end.
+            let coarser = flow;
+            let start = enlarge(&coarser, size, control)?;
+            flow = self.at(level, others, control, |prepared| {
                 let mut pull = 0.0;
                 let mut springs = None;
-                let mut sights: Vec<_> = others.iter().map(|_| prepared.sight()).collect();
-                if let Some(rest) = prepared.look_for_rest(&mut sights[0], control)? {
+                if let Some(rest) = prepared.look_for_rest(control)? {
                     let spring = spring(&rest, prepared.zoom, &resting, control)?;
                     pull = mean(&spring);
                     springs = Some(spring);
-                    resting.push((prepared.zoom, rest.rest));
+                    if level > self.finest {
+                        resting.push((prepared.zoom, rest.rest));
+                    }
                 }
-                let refined = prepared.refine(
-                    flow.clone(),
-                    self.warps[level],
-                    springs,
-                    &mut sights,
-                    control,
-                )?;
+                let refined = prepared.refine(start, self.warps[level], springs, control)?;
                 levels.push(LevelTrace {
                     frames: others.len(),
                     size,
@@ -98,19 +95,22 @@ impl Climb<'_> {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
                 }
                 if level == self.finest {
-                    let coherence = prepared.coherence(&refined.flow, &mut sights[0], control)?;
-                    let equations = &refined.equations;
+                    let coherence = prepared.coherence(&refined.flow, control)?;
+                    let coarser = if level + 1 < self.sizes.len() {
+                        Some(enlarge(&coarser, size, control)?)
+                    } else {
+                        None
+                    };
                     let clues = Clues {
                         coherence: &coherence,
                         flow: &refined.flow,
-                        coarser: (level + 1 < self.sizes.len()).then_some(&flow),
+                        coarser: coarser.as_ref(),
                         zoom: prepared.zoom,
-                        matrix: [&equations.a11, &equations.a12, &equations.a22],
+                        matrix: refined.matrix.each_ref().map(|plane| &plane[..]),
                     };
                     trust = Some(confidence(&clues, control)?);
                 }
-                flow = refined.flow;
-                Ok(())
+                Ok(refined.flow)
             })?;
         }
         let nothing = || Array2::zeros(flow.dim());
