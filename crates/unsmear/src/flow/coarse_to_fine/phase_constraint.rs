@@ -239,7 +239,7 @@ fn constraint(filter: &Filter, one: &Cross, other: &Cross) -> [f32; TERMS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gabor::{GaborParameters, Responses};
+    use crate::gabor::GaborParameters;
 
     fn bank() -> GaborBank<f32> {
         GaborBank::new(&GaborParameters {

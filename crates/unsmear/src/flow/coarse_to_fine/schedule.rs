@@ -23,6 +23,9 @@ use crate::pyramid::{Resampling, resample};
 /// Ratio of sizes up to which a level is evidence of motion at a pixel; coarser ones tell of its surroundings.
 const FARTHEST_EVIDENCE: usize = 8;
 
+/// Sums side by side.
+const LANES: usize = 16;
+
 /// Everything that a climb needs.
 pub(super) struct Climb<'a> {
     pub(super) settings: &'a Settings,
@@ -141,7 +144,13 @@ impl Climb<'_> {
 }
 
 fn mean(plane: &Array2<f32>) -> f64 {
-    plane.iter().map(|&s| f64::from(s)).sum::<f64>() / plane.len() as f64
+    let (blocks, rest) = plane.as_slice().unwrap_or_default().as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for block in blocks {
+        sums.iter_mut().zip(block).for_each(|(sum, &s)| *sum += f64::from(s));
+    }
+    let rest: f64 = rest.iter().map(|&s| f64::from(s)).sum();
+    (sums.iter().sum::<f64>() + rest) / plane.len() as f64
 }
 
 /// The flow at another size, motions with it; of no flow, no motion.
