@@ -46,6 +46,20 @@ pub struct SorScratch {
     field: Vec<f32>,
 }
 
+impl SorScratch {
+    /// With room for pictures of up to `height` x `width`.
+    #[must_use]
+    pub fn with_room(height: usize, width: usize) -> Self {
+        let layout = Layout::new(height, width);
+        let room = |per_row: usize| Vec::with_capacity((height + 2) * per_row + LANES);
+        Self {
+            layout: Layout::default(),
+            coefficients: room(layout.block()),
+            field: room(layout.rows()),
+        }
+    }
+}
+
 /// Runs `sweeps` sweeps with relaxation `omega` on (`u`, `v`) in place; see the [module](self).
 ///
 /// # Errors

@@ -43,11 +43,10 @@ pub(super) struct Constraints {
 }
 
 impl Constraints {
-    /// No constraints, for a picture (H, W).
-    pub(super) fn new(filters: usize, height: usize, width: usize) -> Self {
-        let stride = TERMS * width;
+    /// None yet, with room for pictures of up to `samples` pixels.
+    pub(super) fn with_room(filters: usize, samples: usize) -> Self {
         let units = Units { slope: 0.0, step: PI / LARGEST, root: 1.0 / LARGEST };
-        Self { terms: vec![0; height * filters * stride], units, stride, filters }
+        Self { terms: Vec::with_capacity(samples * filters * TERMS), units, stride: 0, filters }
     }
 
     /// Fills them with those of a look.
@@ -61,6 +60,8 @@ impl Constraints {
         control: &Control,
     ) -> Result<()> {
         self.units.slope = filters.largest_slope() / LARGEST;
+        self.stride = TERMS * look.width;
+        self.terms.resize(look.height * self.filters * self.stride, 0);
         let (units, per_row) = (self.units, self.filters * self.stride);
         let scratch = || vec![0.0; per_row];
         look.for_each_row(
@@ -88,9 +89,9 @@ impl Constraints {
     /// From the terms `[G_x, G_y, D, W]` of all rows and filters, of slopes up to `largest`.
     #[cfg(test)]
     pub(super) fn of(terms: &[f32], filters: usize, width: usize, largest: f32) -> Self {
-        let height = terms.len() / (filters * TERMS * width);
-        let mut made = Self::new(filters, height, width);
-        made.units.slope = largest / LARGEST;
+        let mut made = Self::with_room(filters, 0);
+        (made.units.slope, made.stride) = (largest / LARGEST, TERMS * width);
+        made.terms.resize(terms.len(), 0);
         for (terms, out) in terms.chunks(made.stride).zip(made.terms.chunks_mut(made.stride)) {
             pack(terms, made.units, out);
         }
