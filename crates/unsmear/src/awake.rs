@@ -110,9 +110,9 @@ mod tests {
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
-                    (0..20).for_each(|_| {
+                    for _ in 0..20 {
                         assert_eq!(shared.install(|| awake(stages)), expected);
-                    })
+                    }
                 });
             }
         });

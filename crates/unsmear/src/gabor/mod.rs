@@ -31,12 +31,11 @@ use crate::real::Real;
 mod parameters;
 mod respond;
 mod responses;
-mod stream;
+pub(crate) mod stream;
 mod taps;
 
 pub use parameters::GaborParameters;
 pub use responses::Responses;
-pub(crate) use stream::ResponseRows;
 use taps::{EvenOdd, wavevector};
 
 /// Planned filters; see the [module](self). Build once, run on many pictures.

@@ -5,14 +5,11 @@ use rayon::prelude::*;
 
 use super::GaborBank;
 use super::responses::Responses;
-use super::stream::ResponseRows;
+use super::stream::{BAND, ResponseRows};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 use crate::real::Real;
-
-/// Rows of a band: of the rows filtered along x, `2 r` more than these are done.
-const BAND: usize = 32;
 
 impl<T: Real> GaborBank<T> {
     /// Responses of all filters to a picture (H, W).

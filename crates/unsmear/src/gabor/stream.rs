@@ -11,8 +11,12 @@
 use super::{GaborBank, MirrorPair};
 use crate::border::Border;
 use crate::convolve::pad_row;
-use crate::even_odd::{difference, even_odd_sums, sum};
+use crate::even_odd::{even_odd_sums, even_sums, mirrored_sums};
 use crate::real::Real;
+
+/// Rows that are worth a stream of their own, when several run side by side: of the rows filtered along x, `2 r` more
+/// than these are done.
+pub(crate) const BAND: usize = 32;
 
 /// The responses of a bank to a picture, asked for row by row.
 pub(crate) struct ResponseRows<'a, T> {
@@ -26,8 +30,8 @@ pub(crate) struct ResponseRows<'a, T> {
     /// The next row to filter along x.
     next: usize,
     padded: Vec<T>,
-    /// Four lines of sums, and one of zeros: what a zero border reads.
-    scratch: Vec<T>,
+    /// What a zero border reads.
+    zeros: Vec<T>,
 }
 
 impl<'a, T: Real> ResponseRows<'a, T> {
@@ -49,7 +53,7 @@ impl<'a, T: Real> ResponseRows<'a, T> {
             filtered: vec![T::zero(); kept * 2 * bank.along_x.len() * width],
             next: first.saturating_sub(bank.radius),
             padded: vec![T::zero(); width + 2 * bank.radius],
-            scratch: vec![T::zero(); 5 * width],
+            zeros: vec![T::zero(); width],
         }
     }
 
@@ -58,7 +62,8 @@ impl<'a, T: Real> ResponseRows<'a, T> {
         while self.next <= (y + self.bank.radius).min(self.height - 1) {
             self.filter_along_x();
         }
-        for pair in &self.bank.pairs {
+        let bank = self.bank;
+        for pair in &bank.pairs {
             self.filter_along_y(pair, y, out);
         }
     }
@@ -78,43 +83,43 @@ impl<'a, T: Real> ResponseRows<'a, T> {
         let lines = &mut self.filtered[self.next % kept * stride..][..stride];
         for (taps, lines) in self.bank.along_x.iter().zip(lines.chunks_mut(2 * width)) {
             let (even, odd) = lines.split_at_mut(width);
-            even_odd_sums(&shifted, &taps.even, &taps.odd, even, odd);
+            if taps.real {
+                even_sums(&shifted, &taps.even, even);
+            } else {
+                even_odd_sums(&shifted, &taps.even, &taps.odd, even, odd);
+            }
         }
         self.next += 1;
     }
 
-    /// One row of the responses of a pair of mirrored filters.
-    fn filter_along_y(&mut self, pair: &MirrorPair<T>, y: usize, out: &mut [T]) {
+    /// One row of the responses of a pair of mirrored filters, or of one on an axis, where `B` or `S` is 0.
+    fn filter_along_y(&self, pair: &MirrorPair<T>, y: usize, out: &mut [T]) {
         let (width, stride, radius) = (self.width, self.stride(), self.bank.radius);
-        let (filtered, border, height) = (&self.filtered, self.border, self.height);
-        let (scratch, zeros) = self.scratch.split_at_mut(4 * width);
-        let zeros = &*zeros;
         let line = |j: usize, part: usize| {
-            border.index((y + j) as isize - radius as isize, height).map_or(zeros, |row| {
+            let row = self.border.index((y + j) as isize - radius as isize, self.height);
+            row.map_or(&self.zeros[..], |row| {
                 let start = row % (2 * radius + 1) * stride + (2 * pair.along_x + part) * width;
-                &filtered[start..start + width]
+                &self.filtered[start..start + width]
             })
         };
         let lines = |part| (0..=2 * radius).map(|j| line(j, part)).collect::<Vec<&[T]>>();
-        let (first, second) = scratch.split_at_mut(2 * width);
-        let (ac, sa) = first.split_at_mut(width);
-        let (bc, sb) = second.split_at_mut(width);
         let taps = &pair.along_y;
-        even_odd_sums(&lines(0), &taps.even, &taps.odd, ac, sa);
-        if self.bank.along_x[pair.along_x].real {
-            bc.fill(T::zero());
-            sb.fill(T::zero());
-        } else {
-            even_odd_sums(&lines(1), &taps.even, &taps.odd, bc, sb);
-        }
         let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
-        let (re, im) = out[plane(pair.filter)].split_at_mut(width);
-        difference(ac, sb, re);
-        sum(sa, bc, im);
-        if let Some(mirror) = pair.mirror {
-            let (re, im) = out[plane(mirror)].split_at_mut(width);
-            sum(ac, sb, re);
-            difference(sa, bc, im);
-        }
+        let Some(mirror) = pair.mirror else {
+            let (re, im) = out[plane(pair.filter)].split_at_mut(width);
+            if taps.real {
+                even_sums(&lines(0), &taps.even, re);
+                even_sums(&lines(1), &taps.even, im);
+            } else {
+                even_odd_sums(&lines(0), &taps.even, &taps.odd, re, im);
+            }
+            return;
+        };
+        // The mirror of a filter comes after it.
+        let (before, after) = out.split_at_mut(plane(mirror).start);
+        let (re, im) = before[plane(pair.filter)].split_at_mut(width);
+        let (mirror_re, mirror_im) = after[..2 * width].split_at_mut(width);
+        let rows = [&lines(0)[..], &lines(1)[..]];
+        mirrored_sums(rows, &taps.even, &taps.odd, re, im, mirror_re, mirror_im);
     }
 }

@@ -23,6 +23,7 @@ mod layout;
 mod relax;
 mod system;
 
+use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use crate::control::Control;
@@ -38,12 +39,29 @@ const HALVES_PER_PASS: usize = 10;
 /// Fewest pixels worth a thread of their own: a pass over them takes some 40 us, ten times its scheduling.
 const PIXELS_PER_BAND: usize = 16384;
 
+/// Samples of fresh memory that one thread clears at a time: the system hands it out page by page meanwhile.
+const SAMPLES_AT_ONCE: usize = 1 << 16;
+
 /// Memory of [`solve`], 36 B/px; reusable between calls of any size.
 #[derive(Debug, Default)]
 pub struct SorScratch {
     layout: Layout,
     coefficients: Vec<f32>,
     field: Vec<f32>,
+}
+
+impl SorScratch {
+    /// With room for pictures of up to `height` x `width`.
+    #[must_use]
+    pub fn with_room(height: usize, width: usize) -> Self {
+        let layout = Layout::new(height, width);
+        let room = |per_row: usize| Vec::with_capacity((height + 2) * per_row + LANES);
+        Self {
+            layout: Layout::default(),
+            coefficients: room(layout.block()),
+            field: room(layout.rows()),
+        }
+    }
 }
 
 /// Runs `sweeps` sweeps with relaxation `omega` on (`u`, `v`) in place; see the [module](self).
@@ -93,8 +111,8 @@ pub fn solve_rows(
         // Padding is zero and stays so.
         *former = layout;
         for (values, per_row) in [(&mut *coefficients, layout.block()), (field, layout.rows())] {
-            values.clear();
-            values.resize((layout.height + 2) * per_row + LANES, 0.0);
+            let samples = (layout.height + 2) * per_row + LANES;
+            repeat_n(0.0, samples).with_min_len(SAMPLES_AT_ONCE).collect_into_vec(values);
         }
     }
     let (coefficients, field) = (aligned(coefficients), aligned(field));

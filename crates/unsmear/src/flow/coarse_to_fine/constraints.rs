@@ -11,6 +11,8 @@
 use std::f32::consts::PI;
 
 use multiversion::multiversion;
+use rayon::iter::repeat_n;
+use rayon::prelude::*;
 
 use super::look::Look;
 use super::phase_constraint::{Filters, TERMS};
@@ -32,6 +34,9 @@ pub(super) struct Units {
     pub(super) root: f32,
 }
 
+/// Samples of fresh memory that one thread clears at a time.
+const SAMPLES_AT_ONCE: usize = 1 << 17;
+
 /// Rows `[G_x, G_y, D, sqrt W]` of each filter, (H, N, 4, W).
 #[derive(Debug)]
 pub(super) struct Constraints {
@@ -43,11 +48,10 @@ pub(super) struct Constraints {
 }
 
 impl Constraints {
-    /// No constraints, for a picture (H, W).
-    pub(super) fn new(filters: usize, height: usize, width: usize) -> Self {
-        let stride = TERMS * width;
+    /// None yet, with room for pictures of up to `samples` pixels.
+    pub(super) fn with_room(filters: usize, samples: usize) -> Self {
         let units = Units { slope: 0.0, step: PI / LARGEST, root: 1.0 / LARGEST };
-        Self { terms: vec![0; height * filters * stride], units, stride, filters }
+        Self { terms: Vec::with_capacity(samples * filters * TERMS), units, stride: 0, filters }
     }
 
     /// Fills them with those of a look.
@@ -61,6 +65,11 @@ impl Constraints {
         control: &Control,
     ) -> Result<()> {
         self.units.slope = filters.largest_slope() / LARGEST;
+        self.stride = TERMS * look.width;
+        let samples = look.height * self.filters * self.stride;
+        if self.terms.len() != samples {
+            repeat_n(0, samples).with_min_len(SAMPLES_AT_ONCE).collect_into_vec(&mut self.terms);
+        }
         let (units, per_row) = (self.units, self.filters * self.stride);
         let scratch = || vec![0.0; per_row];
         look.for_each_row(
@@ -88,9 +97,9 @@ impl Constraints {
     /// From the terms `[G_x, G_y, D, W]` of all rows and filters, of slopes up to `largest`.
     #[cfg(test)]
     pub(super) fn of(terms: &[f32], filters: usize, width: usize, largest: f32) -> Self {
-        let height = terms.len() / (filters * TERMS * width);
-        let mut made = Self::new(filters, height, width);
-        made.units.slope = largest / LARGEST;
+        let mut made = Self::with_room(filters, 0);
+        (made.units.slope, made.stride) = (largest / LARGEST, TERMS * width);
+        made.terms.resize(terms.len(), 0);
         for (terms, out) in terms.chunks(made.stride).zip(made.terms.chunks_mut(made.stride)) {
             pack(terms, made.units, out);
         }

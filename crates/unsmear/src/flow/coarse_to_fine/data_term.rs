@@ -4,11 +4,14 @@
 //!
 //! ```text
 //! r = G.d + D,   w = W/(1 + (r/r_s)^2)
-//! A = s sum w G G',   b = s sum w G D,   c = A U_0 - b,   s = 1/(k0^2 N F)
+//! A = s sum w G G',   b = s sum w G D,   s = 1/(k0^2 N F)
+//! g (A + S I) U = c = g (A U_0 - b)
 //! ```
 //!
-//! summed over `N` filters and `F` frames: `A U = c` is the data part of the equations for the whole
-//! flow, dimensionless, of trace about 1 where every filter has full weight. The reweighting is that
+//! summed over `N` filters and `F` frames: the data part of the equations for the whole flow,
+//! dimensionless, `A` of trace about 1 where every filter has full weight. `S` is the pull to rest
+//! (see [`super::still`]), `g` the precision (see [`super::precision`]). The equations of a row are made when the
+//! solver wants them and kept nowhere else. The reweighting is that
 //! of the Lorentzian `log(1 + (r/r_s)^2)`: a constraint on another motion, or wrapped by 2 pi, loses
 //! its say. Reference: M. J. Black & P. Anandan 1996 (doi 10.1006/cviu.1996.0006).
 

@@ -27,11 +27,10 @@ use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
-use crate::gabor::{GaborBank, ResponseRows};
+use crate::gabor::GaborBank;
+use crate::gabor::stream::{BAND, ResponseRows};
 use crate::interpolate::{SplineDegree, SplineImage};
 
-/// Rows of a band of the first look at the reference, as in [`super::look`].
-const BAND: usize = 32;
 /// Sums side by side: as many as a register of 512 bits holds.
 const LANES: usize = 16;
 
@@ -119,11 +118,6 @@ impl<'a> Level<'a> {
             coverage: reference.coverage.as_ref(),
             others: others.iter().map(spline).collect::<Result<_>>()?,
         })
-    }
-
-    /// Memory for the constraints of one frame.
-    pub(super) fn constraints(&self) -> Constraints {
-        Constraints::new(self.settings.bank.wavevectors().len(), self.height, self.width)
     }
 
     /// Warps a frame by `flow` and weighs its pixels.

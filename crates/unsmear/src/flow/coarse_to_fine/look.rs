@@ -12,10 +12,9 @@ use super::rows::{for_each_band, row_of};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
-use crate::gabor::{GaborBank, ResponseRows};
+use crate::gabor::GaborBank;
+use crate::gabor::stream::{BAND, ResponseRows};
 
-/// Rows of a band: a sixteenth of the responses and a quarter of the rows filtered along x are done twice.
-const BAND: usize = 32;
 /// Rows of responses that are kept: above, here and below.
 const KEPT: usize = 3;
 

@@ -47,6 +47,7 @@ mod response_pair;
 mod round_trip;
 mod rows;
 mod schedule;
+mod slope;
 mod still;
 mod visible;
 

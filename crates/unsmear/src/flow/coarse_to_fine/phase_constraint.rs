@@ -22,6 +22,7 @@ use multiversion::multiversion;
 
 use super::arctangent::arctangent;
 use super::response_pair::{Band, ResponsePair};
+use super::slope::{Cross, Stencil, deviation, place};
 use crate::gabor::GaborBank;
 
 /// Terms of a constraint, one row each: `G_x`, `G_y`, `D`, `W`.
@@ -40,36 +41,6 @@ pub(super) struct Weighting {
     pub(super) floor: f32,
     /// `(tau sigma_k)^-2`, px^2/rad^2.
     pub(super) narrowness: f32,
-}
-
-/// Complex factors of the samples before and after in a derivative along one axis.
-#[derive(Clone, Copy)]
-struct Stencil {
-    before: [f32; 2],
-    after: [f32; 2],
-}
-
-impl Stencil {
-    /// On a line whose neighbours lie beyond an edge: such a neighbour is the sample itself.
-    fn new(k: f64, first: bool, last: bool) -> Self {
-        let scale = if first || last { 1.0 } else { 0.5 };
-        let turn = |angle: f64, by: f64| [by * angle.cos(), by * angle.sin()].map(|f| f as f32);
-        Self {
-            before: turn(if first { 0.0 } else { k }, -scale),
-            after: turn(if last { 0.0 } else { -k }, scale),
-        }
-    }
-
-    /// Between two neighbours, at the first sample, at the last, and at the only one.
-    fn all(k: f64) -> [Self; 4] {
-        [(false, false), (true, false), (false, true), (true, true)]
-            .map(|(first, last)| Self::new(k, first, last))
-    }
-}
-
-/// Which of [`Stencil::all`] holds at position `i` of `n`.
-fn place(i: usize, n: usize) -> usize {
-    usize::from(i == 0) + 2 * usize::from(i + 1 == n)
 }
 
 /// The constants of one filter on one row.
@@ -171,35 +142,6 @@ fn inner_pixels(
         step[x] = terms[2];
         weight[x] = terms[3] * seen[x];
     }
-}
-
-/// A response and its four neighbours.
-#[derive(Clone, Copy)]
-struct Cross {
-    here: [f32; 2],
-    across: [[f32; 2]; 2],
-    along: [[f32; 2]; 2],
-}
-
-impl Cross {
-    #[inline(always)]
-    fn new([above, here, below]: &Band<'_>, [left, x, right]: [usize; 3]) -> Self {
-        Self {
-            here: [here.0[x], here.1[x]],
-            across: [[here.0[left], here.1[left]], [here.0[right], here.1[right]]],
-            along: [[above.0[x], above.1[x]], [below.0[x], below.1[x]]],
-        }
-    }
-}
-
-/// Deviation of the phase gradient along one axis from the tuned one, rad/px.
-#[inline(always)]
-fn deviation([re, im]: [f32; 2], [a, b]: [[f32; 2]; 2], s: Stencil, inverse: f32) -> f32 {
-    let slope_re =
-        s.before[0] * a[0] - s.before[1] * a[1] + (s.after[0] * b[0] - s.after[1] * b[1]);
-    let slope_im =
-        s.before[0] * a[1] + s.before[1] * a[0] + (s.after[0] * b[1] + s.after[1] * b[0]);
-    (re * slope_im - im * slope_re) * inverse
 }
 
 /// `[G_x, G_y, D, W]` of one pixel, for a frame that is seen there.

@@ -77,15 +77,34 @@ impl SystemRows for Linearised<'_> {
     }
 }
 
-/// Memory of the refinement of one level.
-struct Work {
+/// The largest pieces of memory of a refinement, kept from level to level: the finest needs them in full, and what the
+/// coarser ones take is part of that.
+pub(super) struct Workspace {
     /// Of each other frame.
     constraints: Vec<Constraints>,
+    sor: SorScratch,
+    /// Whether no level follows: then each piece is given back as soon as it has served.
+    pub(super) finest: bool,
+}
+
+impl Workspace {
+    /// For a number of other frames, by a number of filters, of up to `size` (H, W).
+    pub(super) fn new(frames: usize, filters: usize, size: (usize, usize)) -> Self {
+        let constraints = || Constraints::with_room(filters, size.0 * size.1);
+        Self {
+            constraints: (0..frames).map(|_| constraints()).collect(),
+            sor: SorScratch::with_room(size.0, size.1),
+            finest: false,
+        }
+    }
+}
+
+/// What acts on the data of one level besides the constraints.
+struct Weights {
     /// Pull towards rest; see [`super::still`].
     springs: Vec<f32>,
     /// Factor of the data; see [`super::precision`].
     gain: Vec<f32>,
-    sor: SorScratch,
 }
 
 impl Level<'_> {
@@ -95,24 +114,26 @@ impl Level<'_> {
         mut flow: FlowField<f32>,
         warps: usize,
         springs: Option<Array2<f32>>,
+        workspace: &mut Workspace,
         control: &Control,
     ) -> Result<Refined> {
         let samples = self.height * self.width;
-        let mut work = Work {
-            constraints: self.others.iter().map(|_| self.constraints()).collect(),
+        let mut weights = Weights {
             springs: springs.map_or_else(|| vec![0.0; samples], |s| s.into_raw_vec_and_offset().0),
             gain: vec![1.0; samples],
-            sor: SorScratch::default(),
         };
         let mut changes = Vec::with_capacity(warps);
         let mut matrix = [(); 3].map(|()| Vec::new());
         for warp in 0..warps {
-            for (target, constraints) in self.others.iter().zip(&mut work.constraints) {
+            for (target, constraints) in self.others.iter().zip(&mut workspace.constraints) {
                 self.constrain(target, &flow, constraints, control)?;
             }
             let last = (warp + 1 == warps).then_some(&mut matrix);
-            changes.push(self.minimise(&mut flow, &mut work, last, control)?);
+            changes.push(self.minimise(&mut flow, workspace, &mut weights, last, control)?);
             control.advance()?;
+        }
+        if workspace.finest {
+            workspace.constraints.clear();
         }
         let [a11, _, a22] = &matrix;
         let mut trace = Array2::zeros((self.height, self.width));
@@ -120,20 +141,21 @@ impl Level<'_> {
         for_each_rows([plane], [self.width], control, |y, [trace]| {
             for (x, trace) in trace.iter_mut().enumerate() {
                 let i = y * self.width + x;
-                *trace = (a11[i] + a22[i]) / work.gain[i] - 2.0 * work.springs[i];
+                *trace = (a11[i] + a22[i]) / weights.gain[i] - 2.0 * weights.springs[i];
             }
         })?;
-        drop(work);
+        drop(weights);
         Ok(Refined { flow: self.sharpen(flow, control)?, matrix, trace, changes })
     }
 
     /// Moves `flow` to the minimum of the energy within reach of one warp; returns the mean change, px.
     ///
-    /// Where `matrix` is wanted it becomes that of the data terms, and the solver's memory is given back.
+    /// Where `matrix` is wanted it becomes that of the data terms.
     fn minimise(
         &self,
         flow: &mut FlowField<f32>,
-        work: &mut Work,
+        workspace: &mut Workspace,
+        weights: &mut Weights,
         matrix: Option<&mut [Vec<f32>; 3]>,
         control: &Control,
     ) -> Result<f64> {
@@ -141,12 +163,13 @@ impl Level<'_> {
         let (scale, width) = (self.scale(), self.width);
         let [start_u, start_v] =
             [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
-        let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
-        let Work { constraints, springs, gain, sor } = work;
+        let Workspace { constraints, sor, finest } = workspace;
+        let Weights { springs, gain } = weights;
         let frames: Vec<&Constraints> = constraints.iter().collect();
         if self.settings.precision > 0.0 {
             precision(&frames, width, self.settings.precision, scale, gain, control)?;
         }
+        let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
         let data = DataTerm {
             frames,
             warped_with: [start_u, start_v],
@@ -161,7 +184,9 @@ impl Level<'_> {
             solve_rows(&system, size, &mut u, &mut v, RELAXATION, sweeps, sor, control)?;
         }
         if let Some(matrix) = matrix {
-            *sor = SorScratch::default();
+            if *finest {
+                *sor = SorScratch::default();
+            }
             *matrix = matrix_of(&data, [&u, &v], control)?;
         }
         let mut change = 0.0;

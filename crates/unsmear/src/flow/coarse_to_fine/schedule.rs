@@ -13,6 +13,7 @@ use super::confidence::{Clues, confidence};
 use super::evidence::gather;
 use super::frames::FramePyramid;
 use super::level::{Level, Settings};
+use super::refine::Workspace;
 use super::still::spring;
 use crate::awake::awake;
 use crate::control::Control;
@@ -71,10 +72,13 @@ impl Climb<'_> {
         let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
         let (mut evidence, mut trust) = (None, None);
         let (mut resting, mut levels) = (Vec::new(), Vec::new());
+        let filters = self.settings.bank.wavevectors().len();
+        let mut workspace = Workspace::new(others.len(), filters, self.sizes[self.finest]);
         for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
             // Not the enlarged flow but the small one is kept for the comparison at the end.
             let coarser = flow;
             let start = enlarge(&coarser, size, control)?;
+            workspace.finest = level == self.finest;
             flow = self.at(level, others, control, |prepared| {
                 let mut pull = 0.0;
                 let mut springs = None;
@@ -86,7 +90,8 @@ impl Climb<'_> {
                         resting.push((prepared.zoom, rest.rest));
                     }
                 }
-                let refined = prepared.refine(start, self.warps[level], springs, control)?;
+                let refined =
+                    prepared.refine(start, self.warps[level], springs, &mut workspace, control)?;
                 levels.push(LevelTrace {
                     frames: others.len(),
                     size,
