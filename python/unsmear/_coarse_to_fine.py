@@ -10,7 +10,6 @@ from unsmear import _unsmear
 from unsmear._arrays import (
     as_floating,
     as_picture_array,
-    luma,
     move_channels_last,
     require_ndim,
 )
@@ -23,6 +22,9 @@ if TYPE_CHECKING:
     from unsmear._progress import Steps
 
 __all__ = ["estimate"]
+
+# What the core reads without a copy; others become float64.
+_READ_AS_THEY_ARE = tuple(map(np.dtype, ("uint8", "uint16", "float32", "float64")))
 
 
 def estimate(
@@ -38,8 +40,8 @@ def estimate(
 ]:
     """Return flow, confidence, shape (T, H, W), reference frame and levels' records.
 
-    Only the frames that the method looks at are converted; ``index`` turns the number
-    of frames into the reference.
+    Only the frames that the method looks at are read, as they are where the core knows
+    their type; ``index`` turns the number of frames into the reference.
     """
     array = as_picture_array(frames, "frames")
     if channel_axis is None:
@@ -65,19 +67,13 @@ def estimate(
         raise ValueError(msg)
     reach = values["frames_each_side"]
     first = max(0, reference - reach)
-    used = as_floating(
-        array[first : reference + max(reach, 1) + 1], "frames", np.float64
-    )
-    guide = None
-    if channel_axis is not None:
-        # No name keeps the colour frames alive: they are the largest part of memory.
-        guide = np.ascontiguousarray(np.moveaxis(used[reference - first], -1, 0))
-        used = np.ascontiguousarray(luma(used))
+    used = array[first : reference + max(reach, 1) + 1]
+    if used.dtype not in _READ_AS_THEY_ARE or not used.flags.aligned:
+        used = as_floating(used, "frames", np.float64)
     flow, confidence, levels = _unsmear.coarse_to_fine(
-        used,
+        used[..., np.newaxis] if channel_axis is None else used,
         reference - first,
         values,
-        guide=guide,
         mask=None if mask is None else _as_mask(mask, (height, width)),
         progress=progress,
     )

@@ -80,11 +80,10 @@ def correlate_separable(
     volume: _Double, taps: Sequence[Sequence[float]], border: str
 ) -> _Double: ...
 def coarse_to_fine(
-    frames: _Double,
+    frames: NDArray[np.uint8] | NDArray[np.uint16] | _Single | _Double,
     index: int,
     parameters: _Parameters,
     *,
-    guide: _Double | None = None,
     mask: NDArray[np.bool_] | None = None,
     progress: _Progress | None = None,
 ) -> tuple[_Single, _Single, list[tuple[int, int, int, list[float], float, float]]]: ...

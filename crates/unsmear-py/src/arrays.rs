@@ -1,6 +1,6 @@
 //! NumPy arrays to core types and back: views in, moved buffers out.
 
-use ndarray::{Array2, Array3, Axis, stack};
+use ndarray::{Array2, Array3, Axis};
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray3};
 use pyo3::prelude::*;
 use unsmear::{Error, FlowField, FlowView, Real, Result};
@@ -27,9 +27,9 @@ pub(crate) fn flow_to_python<T: Real + Element>(
     flow: FlowField<T>,
 ) -> Bound<'_, PyArray3<T>> {
     let (height, width) = flow.dim();
-    let both = stack(Axis(2), &[flow.u.view(), flow.v.view()])
-        .unwrap_or_else(|_| Array3::zeros((height, width, 2)));
-    both.into_pyarray(py)
+    let pairs: Vec<[T; 2]> = flow.u.iter().zip(&flow.v).map(|(&u, &v)| [u, v]).collect();
+    let both = Array3::from_shape_vec((height, width, 2), pairs.into_flattened());
+    both.unwrap_or_else(|_| Array3::zeros((height, width, 2))).into_pyarray(py)
 }
 
 /// A picture (H, W).

@@ -1,8 +1,8 @@
 //! The default flow.
 
-use numpy::{PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{Element, PyReadonlyArray2, PyReadonlyArray4};
 use pyo3::prelude::*;
-use unsmear::flow::coarse_to_fine::{CoarseToFine, Sequence};
+use unsmear::flow::coarse_to_fine::{CoarseToFine, Sample, Sequence};
 
 use crate::arrays::{flow_to_python, picture_to_python};
 use crate::threads::run;
@@ -38,20 +38,42 @@ pub(crate) struct Items {
 /// A level's record: frames, height, width, changes, evidence, rest.
 type Level = (usize, usize, usize, Vec<f64>, f64, f64);
 
-/// Flow (H, W, 2) and confidence (H, W) of frames (T, H, W) at `index`, and the records of the levels.
+/// Frames (T, H, W, C) of the types that are read as they are.
+#[derive(FromPyObject)]
+pub(crate) enum Frames<'py> {
+    Bytes(PyReadonlyArray4<'py, u8>),
+    Words(PyReadonlyArray4<'py, u16>),
+    Single(PyReadonlyArray4<'py, f32>),
+    Double(PyReadonlyArray4<'py, f64>),
+}
+
+/// Flow (H, W, 2), confidence (H, W) and the records of the levels.
+type Found = (Py<PyAny>, Py<PyAny>, Vec<Level>);
+
+/// The flow of frames (T, H, W, C) at `index`.
 #[pyfunction]
-#[pyo3(signature = (frames, index, parameters, *, guide=None, mask=None, progress=None))]
+#[pyo3(signature = (frames, index, parameters, *, mask=None, progress=None))]
 pub(crate) fn coarse_to_fine(
     py: Python<'_>,
-    frames: PyReadonlyArray3<'_, f64>,
+    frames: Frames<'_>,
     index: usize,
     parameters: Items,
-    guide: Option<PyReadonlyArray3<'_, f64>>,
     mask: Option<PyReadonlyArray2<'_, bool>>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Py<PyAny>, Py<PyAny>, Vec<Level>)> {
-    let Items { pyramid_factor, coarsest_side, finest_level, .. } = parameters;
-    let method = CoarseToFine {
+) -> PyResult<Found> {
+    let method = method(&parameters);
+    let mask = mask.as_ref();
+    match &frames {
+        Frames::Bytes(frames) => estimate(py, &method, frames, index, mask, progress),
+        Frames::Words(frames) => estimate(py, &method, frames, index, mask, progress),
+        Frames::Single(frames) => estimate(py, &method, frames, index, mask, progress),
+        Frames::Double(frames) => estimate(py, &method, frames, index, mask, progress),
+    }
+}
+
+fn method(parameters: &Items) -> CoarseToFine {
+    let &Items { pyramid_factor, coarsest_side, finest_level, .. } = parameters;
+    CoarseToFine {
         pyramid_factor,
         coarsest_side,
         finest_level,
@@ -74,13 +96,19 @@ pub(crate) fn coarse_to_fine(
         forward_backward: parameters.forward_backward,
         adapt_to_noise: parameters.adapt_to_noise,
         choose_frames: parameters.choose_frames,
-    };
-    let sequence = Sequence {
-        frames: frames.as_array(),
-        index,
-        guide: guide.as_ref().map(PyReadonlyArray3::as_array),
-        mask: mask.as_ref().map(PyReadonlyArray2::as_array),
-    };
+    }
+}
+
+fn estimate<T: Sample + Element>(
+    py: Python<'_>,
+    method: &CoarseToFine,
+    frames: &PyReadonlyArray4<'_, T>,
+    index: usize,
+    mask: Option<&PyReadonlyArray2<'_, bool>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Found> {
+    let sequence =
+        Sequence { frames: frames.as_array(), index, mask: mask.map(PyReadonlyArray2::as_array) };
     let (estimate, levels) = run(py, progress, |control| method.trace(&sequence, control))?;
     let flow = flow_to_python(py, estimate.flow).into_any().unbind();
     let levels = levels.into_iter().map(|level| {

@@ -23,6 +23,11 @@ const SUPPORT: f64 = 4.0;
 /// in use a quarter of the rows is done twice.
 const BAND: usize = 64;
 
+/// Taps of [`smooth`] to each side of the middle.
+pub(crate) fn support(sigma: f64) -> usize {
+    (SUPPORT * sigma).ceil() as usize
+}
+
 /// `picture` convolved with a Gaussian of deviation `sigma` px, reflected at the edge.
 ///
 /// # Errors
@@ -32,7 +37,7 @@ pub fn smooth<T: Real>(
     sigma: f64,
     control: &Control,
 ) -> Result<Array2<T>> {
-    let radius = (SUPPORT * sigma).ceil() as usize;
+    let radius = support(sigma);
     let taps: Vec<T> = gaussian_taps(sigma, radius).into_iter().map(T::of).collect();
     let (height, width) = picture.dim();
     let mut out = Array2::zeros((height, width));

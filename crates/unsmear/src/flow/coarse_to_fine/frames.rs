@@ -1,24 +1,23 @@
 //! The frames of a sequence as the method wants them: standardised, filled, at all levels.
 
-use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
+use ndarray::{Array2, ArrayView2, ArrayView4, Axis};
 
 use super::contrast::Contrast;
 use super::known::{coverage, fill};
 use super::level::Frame;
-use crate::array::{require_frames, require_same};
+use super::recorded::{Reading, Sample};
+use crate::array::require_same;
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::pyramid::pyramid;
 
 /// What a flow is measured from.
 #[derive(Debug, Clone, Copy)]
-pub struct Sequence<'a> {
-    /// Grey frames (T, H, W), any scale; not finite = unknown.
-    pub frames: ArrayView3<'a, f64>,
+pub struct Sequence<'a, T> {
+    /// Frames (T, H, W, C), grey (C = 1) or red, green and blue (C = 3), any scale; not finite = unknown.
+    pub frames: ArrayView4<'a, T>,
     /// The reference frame.
     pub index: usize,
-    /// Channels (C, H, W) of the reference frame, in the scale of the frames; without them the frame guides itself.
-    pub guide: Option<ArrayView3<'a, f64>>,
     /// Pixels of every frame that may be used (H, W); without it, all.
     pub mask: Option<ArrayView2<'a, bool>>,
 }
@@ -32,18 +31,16 @@ pub(super) struct FramePyramid {
     known: Option<Vec<Array2<f32>>>,
 }
 
-impl Sequence<'_> {
+impl<T> Sequence<'_, T> {
     /// (T, H, W).
     pub(super) fn check(&self) -> Result<(usize, usize, usize)> {
-        require_frames("frames", &self.frames, [2, 1, 1])?;
-        let (count, height, width) = self.frames.dim();
+        let (count, height, width, channels) = self.frames.dim();
+        if count < 2 || height == 0 || width == 0 || !matches!(channels, 1 | 3) {
+            let least = "(T >= 2, H >= 1, W >= 1, C = 1 or 3)";
+            return Err(Error::shape("frames", least, self.frames.shape()));
+        }
         if self.index + 1 >= count {
             return Err(Error::value("index", format!("in 0..={}", count - 2), self.index));
-        }
-        if let Some(guide) = self.guide
-            && (guide.is_empty() || guide.shape()[1..] != [height, width])
-        {
-            return Err(Error::shape("guide", format!("(C, {height}, {width})"), guide.shape()));
         }
         if let Some(mask) = self.mask {
             require_same("mask", &mask, (height, width))?;
@@ -53,20 +50,22 @@ impl Sequence<'_> {
 }
 
 /// How frames become pyramids.
-pub(super) struct Plan<'a, 's> {
-    pub(super) sequence: &'a Sequence<'s>,
+pub(super) struct Plan<'a, 's, T> {
+    pub(super) sequence: &'a Sequence<'s, T>,
     pub(super) contrast: Contrast,
     pub(super) sizes: &'a [(usize, usize)],
     pub(super) factor: f64,
 }
 
-impl Plan<'_, '_> {
+impl<T: Sample> Plan<'_, '_, T> {
     pub(super) fn frame(&self, offset: f32, t: usize, control: &Control) -> Result<FramePyramid> {
-        let mut picture = self.contrast.apply(self.sequence.frames.index_axis(Axis(0), t));
+        let frame = self.sequence.frames.index_axis(Axis(0), t);
+        let (mut picture, mut unknown) = self.contrast.apply(frame, Reading::Grey, control)?;
         if let Some(mask) = self.sequence.mask {
             picture.zip_mut_with(&mask, |s, &keep| *s = if keep { *s } else { f32::NAN });
+            unknown = true;
         }
-        let known = fill(&mut picture, control)?;
+        let known = if unknown { fill(&mut picture, control)? } else { None };
         let levels = |picture| pyramid(picture, self.sizes, self.factor, control);
         Ok(FramePyramid {
             offset,
@@ -75,20 +74,27 @@ impl Plan<'_, '_> {
         })
     }
 
-    /// The channels of the guide at each level: the reference itself where there is no guide.
+    /// The channels of the guide at each level: those of a colour frame, of a grey one itself.
     pub(super) fn channels(
         &self,
         reference: &FramePyramid,
+        colour: bool,
         control: &Control,
     ) -> Result<Vec<Vec<Array2<f32>>>> {
-        let Some(guide) = self.sequence.guide else {
+        let frame = self.sequence.frames.index_axis(Axis(0), self.sequence.index);
+        let channels = frame.len_of(Axis(2));
+        if channels == 1 || !colour {
             return Ok(reference.pictures.iter().map(|p| vec![p.clone()]).collect());
-        };
+        }
         let mut levels = vec![Vec::new(); self.sizes.len()];
-        for mut channel in self.contrast.channels(guide) {
-            fill(&mut channel, control)?;
+        for channel in 0..channels {
+            let (mut picture, unknown) =
+                self.contrast.apply(frame, Reading::Channel(channel), control)?;
+            if unknown {
+                fill(&mut picture, control)?;
+            }
             for (level, picture) in
-                levels.iter_mut().zip(pyramid(channel, self.sizes, self.factor, control)?)
+                levels.iter_mut().zip(pyramid(picture, self.sizes, self.factor, control)?)
             {
                 level.push(picture);
             }

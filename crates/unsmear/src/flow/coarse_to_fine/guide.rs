@@ -15,8 +15,11 @@
 //! Units: grey levels; `k` (`sensitivity`) and `e` dimensionless, e in (0.05, 1.05].
 //! Reference: L. Alvarez, J. Esclarin, M. Lefebure, J. Sanchez 1999, image-driven smoothness.
 
+use multiversion::multiversion;
 use ndarray::Array2;
 
+use super::exponential::falling;
+use super::rows::for_each_rows;
 use crate::control::Control;
 use crate::error::Result;
 use crate::pyramid::smooth;
@@ -27,6 +30,8 @@ const LEAST: f32 = 0.05;
 const FLOOR: f64 = 0.3;
 /// Deviation of the smoothing before the weighted median, px.
 const MEDIAN_SIGMA: f64 = 0.5;
+/// Sums side by side within a line.
+const LANES: usize = 16;
 
 /// How edges of the guide are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,32 +54,77 @@ pub(super) fn edge_weights(
     control: &Control,
 ) -> Result<[Vec<f32>; 2]> {
     let (height, width) = channels[0].dim();
-    let mut squares = [vec![0.0f32; height * width], vec![0.0f32; height * width]];
+    let smoothed = channels
+        .iter()
+        .map(|channel| smooth(channel.view(), rule.sigma, control))
+        .collect::<Result<Vec<_>>>()?;
+    let planes: Vec<&[f32]> = smoothed.iter().filter_map(|plane| plane.as_slice()).collect();
     let share = if rule.strongest_channel { 1.0 } else { 1.0 / channels.len() as f32 };
-    for channel in channels {
-        let smoothed = smooth(channel.view(), rule.sigma, control)?;
-        let samples = smoothed.as_slice().unwrap_or_default();
-        for (axis, squares) in squares.iter_mut().enumerate() {
-            let step = if axis == 0 { 1 } else { width };
-            for y in 0..height - usize::from(axis == 1) {
-                for i in y * width..(y + 1) * width - usize::from(axis == 0) {
-                    let square = (samples[i + step] - samples[i]).powi(2) * share;
-                    squares[i] = if rule.strongest_channel {
-                        squares[i].max(square)
-                    } else {
-                        squares[i] + square
-                    };
-                }
+    let combine = if rule.strongest_channel { greatest } else { added };
+    let [mut across, mut down] = [(); 2].map(|()| vec![0.0f32; height * width]);
+    let mut sums = vec![0.0f32; height];
+    let outputs = [&mut across[..], &mut down[..], &mut sums[..]];
+    for_each_rows(outputs, [width, width, 1], control, |y, [across, down, sum]| {
+        for plane in &planes {
+            let here = &plane[y * width..(y + 1) * width];
+            combine(&here[..width - 1], &here[1..], share, &mut across[..width - 1]);
+            if y + 1 < height {
+                combine(here, &plane[(y + 1) * width..(y + 2) * width], share, down);
             }
         }
-        control.check()?;
-    }
-    let total: f64 = squares.iter().flatten().map(|&s| f64::from(s)).sum();
+        sum[0] = total(across) + total(down);
+    })?;
+    let total: f64 = sums.iter().map(|&s| f64::from(s)).sum();
     let scale = (total / (height * width) as f64).sqrt() + FLOOR;
-    let factor = (-rule.sensitivity / scale) as f32;
-    squares.iter_mut().flatten().for_each(|s| *s = (factor * s.sqrt()).exp() + LEAST);
-    control.check()?;
-    Ok(squares)
+    let factor = (rule.sensitivity / scale) as f32;
+    for_each_rows([&mut across, &mut down], [width; 2], control, |_, rows| {
+        rows.into_iter().for_each(|row| weigh(row, factor));
+    })?;
+    Ok([across, down])
+}
+
+/// Adds the squared differences of two lines, times `share`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn added(one: &[f32], other: &[f32], share: f32, out: &mut [f32]) {
+    let n = out.len();
+    let (one, other) = (&one[..n], &other[..n]);
+    for x in 0..n {
+        let difference = other[x] - one[x];
+        out[x] += difference * difference * share;
+    }
+}
+
+/// Likewise the greatest of them and of what is there.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn greatest(one: &[f32], other: &[f32], share: f32, out: &mut [f32]) {
+    let n = out.len();
+    let (one, other) = (&one[..n], &other[..n]);
+    for x in 0..n {
+        let square = (other[x] - one[x]) * (other[x] - one[x]) * share;
+        out[x] = if square > out[x] { square } else { out[x] };
+    }
+}
+
+/// Sum of a line, in lanes.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn total(line: &[f32]) -> f32 {
+    let (blocks, rest) = line.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for block in blocks {
+        for lane in 0..LANES {
+            sums[lane] += block[lane];
+        }
+    }
+    rest.iter().zip(&mut sums).for_each(|(s, sum)| *sum += s);
+    sums.iter().sum()
+}
+
+/// Squared differences to weights.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn weigh(line: &mut [f32], factor: f32) {
+    for s in line {
+        *s = falling(factor * s.sqrt()) + LEAST;
+    }
 }
 
 /// The channels as the weighted median wants them: one squared distance over all of them.
@@ -86,10 +136,15 @@ pub(super) fn median_guide(
     control: &Control,
 ) -> Result<Vec<Array2<f32>>> {
     let scale = 1.0 / (channels.len() as f32).sqrt();
-    channels
-        .iter()
-        .map(|channel| Ok(smooth(channel.view(), MEDIAN_SIGMA, control)? * scale))
-        .collect()
+    let scaled = |channel: &Array2<f32>| {
+        let mut smoothed = smooth(channel.view(), MEDIAN_SIGMA, control)?;
+        // Of a grey picture it is 1.
+        if channels.len() > 1 {
+            smoothed *= scale;
+        }
+        Ok(smoothed)
+    };
+    channels.iter().map(scaled).collect()
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@
 //! things that move far are missed. Frames beyond two assume constant motion.
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
 
-use ndarray::{Array2, Zip, s};
+use ndarray::{Array2, s};
 
 use crate::control::Control;
 use crate::error::Result;
@@ -26,27 +26,34 @@ mod arctangent;
 mod boundary;
 mod choice;
 mod confidence;
+mod constraints;
 mod contrast;
 mod data_term;
 mod diffusivity;
 mod evidence;
+mod exponential;
 mod frames;
 mod guide;
 mod known;
 mod level;
+mod look;
 mod noise_rule;
 mod parameters;
 mod phase_constraint;
 mod precision;
+mod recorded;
 mod refine;
+mod response_pair;
 mod round_trip;
 mod rows;
 mod schedule;
+mod slope;
 mod still;
 mod visible;
 
 pub use frames::Sequence;
 pub use parameters::CoarseToFine;
+pub use recorded::Sample;
 pub use schedule::LevelTrace;
 
 use choice::{merge, several_hold};
@@ -58,6 +65,7 @@ use level::Settings;
 use noise_rule::adapt;
 use parameters::FOR_TWO_FRAMES;
 use round_trip::check_round_trip;
+use rows::for_each_rows;
 use schedule::{Climb, Summit, enlarge};
 
 /// Confidence of a flow that is known and deserves none.
@@ -67,10 +75,14 @@ impl CoarseToFine {
     /// Flow and confidence at the reference frame.
     ///
     /// # Errors
-    /// [`Error::Shape`](crate::Error::Shape) below (2, 1, 1) samples or for a guide of another size,
+    /// [`Error::Shape`](crate::Error::Shape) below (2, 1, 1, 1) samples or for other than 1 or 3 channels,
     /// [`Error::Value`](crate::Error::Value) for a parameter out of range or an index without a next frame,
     /// [`Error::Cancelled`](crate::Error::Cancelled).
-    pub fn estimate(&self, sequence: &Sequence<'_>, control: &Control) -> Result<Estimate<f32>> {
+    pub fn estimate<T: Sample>(
+        &self,
+        sequence: &Sequence<'_, T>,
+        control: &Control,
+    ) -> Result<Estimate<f32>> {
         self.trace(sequence, control).map(|(estimate, _)| estimate)
     }
 
@@ -78,49 +90,49 @@ impl CoarseToFine {
     ///
     /// # Errors
     /// As [`CoarseToFine::estimate`].
-    pub fn trace(
+    pub fn trace<T: Sample>(
         &self,
-        sequence: &Sequence<'_>,
+        sequence: &Sequence<'_, T>,
         control: &Control,
     ) -> Result<(Estimate<f32>, Vec<LevelTrace>)> {
         let (count, height, width) = sequence.check()?;
         self.check()?;
         let reversed = Sequence {
-            frames: sequence.frames.slice_move(s![..;-1, .., ..]),
+            frames: sequence.frames.slice_move(s![..;-1, .., .., ..]),
             index: count - 2 - sequence.index,
-            guide: None,
             ..*sequence
         };
         let ways = [*sequence, reversed];
         let ways = &ways[..=usize::from(self.forward_backward)];
         control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
-        let (mut estimate, levels) = self.one_way(sequence, control)?;
+        let (mut estimate, levels) = self.one_way(sequence, true, control)?;
         for way in &ways[1..] {
-            let (back, _) = self.one_way(way, control)?;
+            let (back, _) = self.one_way(way, false, control)?;
             check_round_trip(&mut estimate, &back.flow, control)?;
         }
         Ok((estimate, levels))
     }
 
     /// Number of warps, the unit of progress.
-    fn steps(&self, sequence: &Sequence<'_>, size: (usize, usize)) -> usize {
+    fn steps<T: Sample>(&self, sequence: &Sequence<'_, T>, size: (usize, usize)) -> usize {
         let sizes = level_sizes(size, self.pyramid_factor, self.coarsest_side);
         let finest = self.finest_level.min(sizes.len() - 1);
         let others = self.offsets(sequence.index, sequence.frames.dim().0).len();
         let climbs = 1 + usize::from(self.choose_frames && others > 1);
-        climbs * (finest..sizes.len()).map(|level| self.warps_at(level)).sum::<usize>()
+        climbs * (finest..sizes.len()).map(|level| self.warps_at(level, finest)).sum::<usize>()
     }
 
-    /// The flow of the frames in the order given.
-    fn one_way(
+    /// The flow of the frames in the order given; `colour` lets edges of single channels break it.
+    fn one_way<T: Sample>(
         &self,
-        sequence: &Sequence<'_>,
+        sequence: &Sequence<'_, T>,
+        colour: bool,
         control: &Control,
     ) -> Result<(Estimate<f32>, Vec<LevelTrace>)> {
         let mut settings = self.settings()?;
-        let (count, height, width) = sequence.frames.dim();
+        let (count, height, width, _) = sequence.frames.dim();
         let sizes = level_sizes((height, width), self.pyramid_factor, self.coarsest_side);
-        let contrast = Contrast::measure(sequence.frames);
+        let contrast = Contrast::measure(sequence.frames, control)?;
         if contrast.is_blank() {
             let confidence = Array2::zeros((height, width));
             let flow = FlowField::unknown((height, width));
@@ -133,17 +145,19 @@ impl CoarseToFine {
             .into_iter()
             .map(|(offset, t)| plan.frame(offset, t, control))
             .collect::<Result<Vec<_>>>()?;
-        let channels = plan.channels(&reference, control)?;
+        let channels = plan.channels(&reference, colour, control)?;
         if self.adapt_to_noise {
             let picture = reference.pictures[0].as_slice().unwrap_or_default();
             adapt(&mut settings, picture, (height, width), control)?;
         }
-        let warps: Vec<usize> = (0..sizes.len()).map(|level| self.warps_at(level)).collect();
+        let finest = self.finest_level.min(sizes.len() - 1);
+        let warps: Vec<usize> =
+            (0..sizes.len()).map(|level| self.warps_at(level, finest)).collect();
         let climb = Climb {
             settings: &settings,
             sizes: &sizes,
             warps: &warps,
-            finest: self.finest_level.min(sizes.len() - 1),
+            finest,
             reference: &reference,
             channels: &channels,
         };
@@ -168,8 +182,9 @@ impl CoarseToFine {
             .collect()
     }
 
-    fn warps_at(&self, level: usize) -> usize {
-        if level == 0 { self.finest_warps } else { self.warps }
+    /// Warps at a level of which `finest` is the last that is solved.
+    fn warps_at(&self, level: usize, finest: usize) -> usize {
+        if level == finest { self.finest_warps } else { self.warps }
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -232,14 +247,15 @@ fn descend(summit: &Summit, size: (usize, usize), control: &Control) -> Result<E
     let mut flow = enlarge(&summit.flow, size, control)?;
     let mut confidence = larger(&summit.confidence)?;
     let evidence = larger(&summit.evidence)?;
-    Zip::from(&evidence).and(&mut flow.u).and(&mut flow.v).and(&mut confidence).for_each(
-        |&e, u, v, c| {
-            if e >= LEAST_EVIDENCE {
-                *c = c.clamp(LEAST_CONFIDENCE, 1.0);
-            } else {
-                (*u, *v, *c) = (f32::NAN, f32::NAN, 0.0);
-            }
-        },
-    );
+    let planes = [&mut flow.u, &mut flow.v, &mut confidence]
+        .map(|plane| plane.as_slice_mut().unwrap_or_default());
+    for_each_rows(planes, [size.1; 3], control, |y, [u, v, c]| {
+        for (x, &e) in evidence.row(y).iter().enumerate() {
+            let known = e >= LEAST_EVIDENCE;
+            u[x] = if known { u[x] } else { f32::NAN };
+            v[x] = if known { v[x] } else { f32::NAN };
+            c[x] = if known { c[x].clamp(LEAST_CONFIDENCE, 1.0) } else { 0.0 };
+        }
+    })?;
     Ok(Estimate { flow, confidence })
 }
