@@ -13,7 +13,7 @@
 //!
 //! Light changes everywhere, motion changes means and deviations only where something comes or goes:
 //! the median over the picture tells one from the other, and `w = 0` says that the light has not
-//! changed. `G_15 *` is a Gaussian average of deviation 15 px of the frames, taken over cells of 8 px and
+//! changed. The line of a whole plane, one gain and one offset, takes its mean and deviation over all of it. `G_15 *` is a Gaussian average of deviation 15 px of the frames, taken over cells of 8 px and
 //! interpolated between their centres.
 //!
 //! Valid for light that changes smoothly over some 30 px; the edge of a moving shadow is a motion.
@@ -82,6 +82,17 @@ impl Light {
         Ok(Self { mean, deviation })
     }
 
+    /// Of a plane as a whole, in one cell.
+    pub(super) fn uniform(plane: &Array2<f32>) -> Self {
+        let mean_of = |term: fn(f64) -> f64| {
+            plane.iter().map(|&s| term(f64::from(s))).sum::<f64>() / plane.len() as f64
+        };
+        let mean = mean_of(|s| s);
+        let variance = (mean_of(|s| s * s) - mean * mean).max(0.0) as f32;
+        let cell = |value| Array2::from_elem((1, 1), value);
+        Self { mean: cell(mean as f32), deviation: cell((variance + PLAIN).sqrt()) }
+    }
+
     /// `w`: how far the light of `other` is another.
     pub(super) fn change(&self, other: &Self) -> f32 {
         let mut differences: Vec<f32> = Vec::with_capacity(self.mean.len());
@@ -119,6 +130,11 @@ pub(super) struct Line {
 pub(super) struct Columns(Vec<(usize, f32)>);
 
 impl Line {
+    /// What becomes of the value `sample` in the first cell: everywhere, by the line of [`Light::uniform`].
+    pub(super) fn first(&self, sample: f32) -> f32 {
+        self.gain[(0, 0)] * sample + self.offset[(0, 0)]
+    }
+
     /// Where the pixels of a row of `width` samples lie.
     pub(super) fn columns(&self, width: usize) -> Columns {
         Columns((0..width).map(|x| between(x, width, self.gain.ncols())).collect())
@@ -205,6 +221,8 @@ mod tests {
             assert!(gain.iter().all(|g| (g - 1.25).abs() < 0.005));
             assert!(offset.iter().all(|o| (o - 37.5).abs() < 0.2));
         }
+        let uniform = Light::uniform(&plane).line(&Light::uniform(&other), 1.0);
+        assert!((uniform.first(10.0) - 50.0).abs() < 0.1);
         let same = here.line(&there, 0.0);
         assert!(same.gain.iter().all(|&g| g == 1.0) && same.offset.iter().all(|&o| o == 0.0));
     }

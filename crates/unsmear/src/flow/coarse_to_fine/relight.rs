@@ -1,7 +1,9 @@
 //! Frames in other light shown as the reference would show them, and both as either could.
 //!
 //! Where the light has changed (see [`super::lighting`]) each channel `J_1` of the other frame becomes
-//! `g J_1 + o`. A sensor that was saturated cannot be brought back: the border of the white region
+//! `g J_1 + o`: first by one line for the whole plane, which motion hardly touches, and where the light
+//! is another still, as the local means and deviations then tell, by a line that follows the
+//! place. A sensor that was saturated cannot be brought back: the border of the white region
 //! follows the light instead of the thing. What one frame could not record is therefore taken
 //! from the other as well,
 //!
@@ -12,9 +14,12 @@
 //! with the least and the greatest sample `b`, `t` of each plane, as far as they come in runs: four that
 //! form a square; lone extremes are the content of a picture that is not saturated. The same
 //! brightness is then cut off in both, and the border belongs to the thing again. Means and
-//! deviations of what is left give a better line: three rounds. What the method sees is the
-//! Rec. 601 luma of the channels, or the only one. Grey levels of the standardised sequence, whatever the type of
-//! the samples was.
+//! deviations of what is left give a better line: [`ROUNDS`] rounds. What the method sees is the
+//! Rec. 601 luma of the channels, or the only one. Grey levels of the standardised sequence, whatever
+//! the type of the samples was.
+//!
+//! Where light changes from place to place, a smooth thing wider than some 30 px is itself taken for
+//! light, and its motion is found too small.
 
 use ndarray::Array2;
 
@@ -26,7 +31,7 @@ use crate::control::Control;
 use crate::error::Result;
 
 /// Rounds of line and common range where a plane is saturated.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
 
 /// The least and greatest samples at which a plane is saturated; infinite where it is not.
 type Range = [f32; 2];
@@ -44,21 +49,7 @@ pub(super) fn relight(
     control: &Control,
 ) -> Result<Array2<f32>> {
     for (seen, plane) in reference.iter_mut().zip(&mut *other) {
-        let ranges = [saturation(seen), saturation(plane)];
-        let saturated = ranges.iter().flatten().any(|bound| bound.is_finite());
-        let mut line = line(seen, plane, change, control)?;
-        if saturated {
-            let whole = [seen.clone(), plane.clone()];
-            for round in 1..=ROUNDS {
-                seen.assign(&whole[0]);
-                plane.assign(&whole[1]);
-                keep_common(seen, plane, &line, ranges, control)?;
-                if round < ROUNDS {
-                    line = self::line(seen, plane, change, control)?;
-                }
-            }
-        }
-        follow(plane, &line, control)?;
+        match_plane(seen, plane, change, control)?;
     }
     luma(other, control)
 }
@@ -86,9 +77,53 @@ pub(super) fn luma(planes: &[Array2<f32>], control: &Control) -> Result<Array2<f
     Ok(out)
 }
 
-fn line(seen: &Array2<f32>, plane: &Array2<f32>, change: f32, control: &Control) -> Result<Line> {
-    let there = Light::measure(plane, control)?;
-    Ok(Light::measure(seen, control)?.line(&there, change))
+/// Brings one plane to the light of the other, and both to what either can show.
+fn match_plane(
+    seen: &mut Array2<f32>,
+    plane: &mut Array2<f32>,
+    change: f32,
+    control: &Control,
+) -> Result<()> {
+    let mut whole = [seen.clone(), plane.clone()];
+    let mut ranges = [saturation(seen), saturation(plane)];
+    let uniform = |plane: &Array2<f32>| Ok(Light::uniform(plane));
+    let line = settle([&mut *seen, &mut *plane], &whole, ranges, change, uniform, control)?;
+    follow(plane, &line, control)?;
+    let place = |plane: &Array2<f32>| Light::measure(plane, control);
+    let change = change * place(seen)?.change(&place(plane)?);
+    if change > 0.0 {
+        follow(&mut whole[1], &line, control)?;
+        ranges[1] = ranges[1].map(|bound| line.first(bound));
+        let line = settle([&mut *seen, &mut *plane], &whole, ranges, change, place, control)?;
+        follow(plane, &line, control)?;
+    }
+    Ok(())
+}
+
+/// The line between the planes `whole`, which are left in `planes` without what one of them cannot show.
+fn settle(
+    [seen, plane]: [&mut Array2<f32>; 2],
+    whole: &[Array2<f32>; 2],
+    ranges: [Range; 2],
+    change: f32,
+    measure: impl Fn(&Array2<f32>) -> Result<Light>,
+    control: &Control,
+) -> Result<Line> {
+    let line =
+        |seen: &_, plane: &_| -> Result<Line> { Ok(measure(seen)?.line(&measure(plane)?, change)) };
+    let mut found = line(&whole[0], &whole[1])?;
+    let saturated = ranges.iter().flatten().any(|bound| bound.is_finite());
+    for round in 0..if saturated { ROUNDS } else { 1 } {
+        if round > 0 {
+            found = line(seen, plane)?;
+        }
+        seen.assign(&whole[0]);
+        plane.assign(&whole[1]);
+        if saturated {
+            keep_common(seen, plane, &found, ranges, control)?;
+        }
+    }
+    Ok(found)
 }
 
 /// The extremes of a plane that four samples in a square have.
