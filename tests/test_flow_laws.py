@@ -137,6 +137,24 @@ def test_types_and_layouts_of_one_picture_have_one_flow(
         np.testing.assert_array_equal(flow(layout, method), expected)
 
 
+def test_layouts_of_one_colour_picture_have_one_flow(frames: Array) -> None:
+    """Colour is read where it lies: packed, by channel, backwards, off the grid."""
+    grey = np.rint(255 * frames[:2, :40, :44])
+    colour = np.stack([grey, 255 - grey, grey[:, ::-1]], -1).astype(np.uint8)
+    expected = flow(colour, "fast", channel_axis=-1)
+    backwards = colour[..., ::-1].copy()[..., ::-1]
+    np.testing.assert_array_equal(flow(backwards, "fast", channel_axis=-1), expected)
+    for axis in (0, 1, 2):
+        apart = np.ascontiguousarray(np.moveaxis(colour, -1, axis))
+        np.testing.assert_array_equal(flow(apart, "fast", channel_axis=axis), expected)
+    record = np.zeros(colour.shape, np.dtype([("odd", "u1"), ("sample", "f8")]))
+    record["sample"] = colour
+    assert not record["sample"].flags.aligned
+    np.testing.assert_array_equal(
+        flow(record["sample"], "fast", channel_axis=-1), expected
+    )
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_one_bad_pixel_stays_local(frames: Array, method: str, bad: float) -> None:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from textures import moving_texture
 from unsmear import _unsmear
 
-METHODS = ("least-squares", "fleet-jepson", "thesis")
+METHODS = ("least-squares", "fleet-jepson", "thesis", "fast", "balanced")
 SetThreads = Callable[[int], None]
 
 

@@ -18,12 +18,15 @@ use crate::errors::to_python;
 /// Ctrl-C must be answered within 0.2 s; a quarter of that leaves room for the slice of work under way.
 const POLL: Duration = Duration::from_millis(50);
 
+/// Pools that stay, the last used first: who changes their number back and forth pays for none of it.
+const POOLS: usize = 2;
+
 struct Pool {
     process: u32,
     threads: Arc<ThreadPool>,
 }
 
-static POOL: Mutex<Option<Pool>> = Mutex::new(None);
+static POOL: Mutex<Vec<Pool>> = Mutex::new(Vec::new());
 static WANTED: Mutex<Option<usize>> = Mutex::new(None);
 
 fn wanted() -> PyResult<usize> {
@@ -42,12 +45,15 @@ fn wanted() -> PyResult<usize> {
 
 fn pool() -> PyResult<Arc<ThreadPool>> {
     let n = wanted()?;
-    let mut slot = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut pools = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = std::process::id();
-    if let Some(pool) =
-        slot.as_ref().filter(|p| p.process == process && p.threads.current_num_threads() == n)
-    {
-        return Ok(Arc::clone(&pool.threads));
+    if pools.iter().any(|pool| pool.process != process) {
+        // A pool inherited through `fork` has no live threads: dropping it would wait for them for ever.
+        pools.drain(..).for_each(std::mem::forget);
+    }
+    if let Some(at) = pools.iter().position(|pool| pool.threads.current_num_threads() == n) {
+        pools[..=at].rotate_right(1);
+        return Ok(Arc::clone(&pools[0].threads));
     }
     let threads = ThreadPoolBuilder::new()
         .num_threads(n)
@@ -55,12 +61,8 @@ fn pool() -> PyResult<Arc<ThreadPool>> {
         .build()
         .map_err(|e| PyRuntimeError::new_err(format!("cannot start {n} threads: {e}")))?;
     let threads = Arc::new(threads);
-    // A pool inherited through `fork` has no live threads: dropping it would wait for them for ever.
-    if let Some(old) = slot.replace(Pool { process, threads: Arc::clone(&threads) })
-        && old.process != process
-    {
-        std::mem::forget(old);
-    }
+    pools.truncate(POOLS - 1);
+    pools.insert(0, Pool { process, threads: Arc::clone(&threads) });
     Ok(threads)
 }
 

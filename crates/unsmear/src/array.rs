@@ -13,6 +13,9 @@ use crate::error::{Error, Result};
 /// small enough that two threads finish together on the shortest.
 const ROWS_PER_TASK: usize = 8;
 
+/// Samples below which one thread is done before another has heard of the work.
+pub(crate) const FEW: usize = 4096;
+
 /// Runs `row(y, out_row)` for every row of a packed picture of rows of `width` samples, in parallel.
 ///
 /// # Errors
@@ -37,14 +40,19 @@ pub(crate) fn for_each_row_with<T: Send, S>(
     if width == 0 {
         return Ok(());
     }
-    out.par_chunks_mut(width * ROWS_PER_TASK).enumerate().try_for_each(|(task, rows)| {
+    let several = |first: usize, rows: &mut [T]| {
         let mut scratch = scratch();
         for (i, out_row) in rows.chunks_mut(width).enumerate() {
             control.check()?;
-            row(task * ROWS_PER_TASK + i, out_row, &mut scratch);
+            row(first + i, out_row, &mut scratch);
         }
         Ok(())
-    })
+    };
+    if out.len() <= FEW {
+        return several(0, out);
+    }
+    let tasks = out.par_chunks_mut(width * ROWS_PER_TASK).enumerate();
+    tasks.try_for_each(|(task, rows)| several(task * ROWS_PER_TASK, rows))
 }
 
 /// Checks that a sequence (T, H, W) has at least the given extents.

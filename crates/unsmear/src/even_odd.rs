@@ -64,23 +64,97 @@ pub(crate) fn even_odd_sums<T: Real>(
     }
 }
 
-/// `out = a + b`.
+/// The even sum alone, for a filter without an odd part.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn sum<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
-    let n = out.len();
-    let (a, b) = (&a[..n], &b[..n]);
-    for x in 0..n {
-        out[x] = a[x] + b[x];
+pub(crate) fn even_sums<T: Real>(rows: &[&[T]], taps: &[T], out: &mut [T]) {
+    let radius = taps.len() - 1;
+    for start in (0..out.len()).step_by(LANES) {
+        let end = (start + LANES).min(out.len());
+        let out = &mut out[start..end];
+        let mut sum = [T::zero(); LANES];
+        if out.len() == LANES {
+            let centre = &rows[radius][start..end];
+            for i in 0..LANES {
+                sum[i] = taps[0] * centre[i];
+            }
+            for j in 1..=radius {
+                let (a, b) = (&rows[radius + j][start..end], &rows[radius - j][start..end]);
+                for i in 0..LANES {
+                    sum[i] += taps[j] * (a[i] + b[i]);
+                }
+            }
+            out.copy_from_slice(&sum);
+        } else {
+            for i in 0..out.len() {
+                sum[i] = taps[0] * rows[radius][start + i];
+                for j in 1..=radius {
+                    sum[i] += taps[j] * (rows[radius + j][start + i] + rows[radius - j][start + i]);
+                }
+                out[i] = sum[i];
+            }
+        }
     }
 }
 
-/// `out = a - b`.
+/// A filter and its mirror: with the sums `even` and `odd` of `rows[0]` and `rows[1]`,
+///
+/// ```text
+/// re, im = even_0 - odd_1, odd_0 + even_1,      mirror_re, mirror_im = even_0 + odd_1, odd_0 - even_1
+/// ```
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn difference<T: Real>(a: &[T], b: &[T], out: &mut [T]) {
-    let n = out.len();
-    let (a, b) = (&a[..n], &b[..n]);
-    for x in 0..n {
-        out[x] = a[x] - b[x];
+pub(crate) fn mirrored_sums<T: Real>(
+    rows: [&[&[T]]; 2],
+    even_taps: &[T],
+    odd_taps: &[T],
+    re: &mut [T],
+    im: &mut [T],
+    mirror_re: &mut [T],
+    mirror_im: &mut [T],
+) {
+    let (radius, n) = (even_taps.len() - 1, re.len());
+    for start in (0..n).step_by(LANES) {
+        let count = LANES.min(n - start);
+        let mut even = [[T::zero(); LANES]; 2];
+        let mut odd = [[T::zero(); LANES]; 2];
+        for (part, rows) in rows.into_iter().enumerate() {
+            let (even, odd) = (&mut even[part], &mut odd[part]);
+            if count == LANES {
+                let centre = &rows[radius][start..start + LANES];
+                for i in 0..LANES {
+                    even[i] = even_taps[0] * centre[i];
+                }
+                for j in 1..=radius {
+                    let above = &rows[radius + j][start..start + LANES];
+                    let below = &rows[radius - j][start..start + LANES];
+                    for i in 0..LANES {
+                        even[i] += even_taps[j] * (above[i] + below[i]);
+                        odd[i] += odd_taps[j] * (above[i] - below[i]);
+                    }
+                }
+            } else {
+                for i in 0..count {
+                    even[i] = even_taps[0] * rows[radius][start + i];
+                    for j in 1..=radius {
+                        let (a, b) = (rows[radius + j][start + i], rows[radius - j][start + i]);
+                        even[i] += even_taps[j] * (a + b);
+                        odd[i] += odd_taps[j] * (a - b);
+                    }
+                }
+            }
+        }
+        let [[even, others], [odd, odds]] = [even, odd];
+        let mut out = [[T::zero(); LANES]; 4];
+        for i in 0..LANES {
+            out[0][i] = even[i] - odds[i];
+            out[1][i] = odd[i] + others[i];
+            out[2][i] = even[i] + odds[i];
+            out[3][i] = odd[i] - others[i];
+        }
+        let end = start + count;
+        re[start..end].copy_from_slice(&out[0][..count]);
+        im[start..end].copy_from_slice(&out[1][..count]);
+        mirror_re[start..end].copy_from_slice(&out[2][..count]);
+        mirror_im[start..end].copy_from_slice(&out[3][..count]);
     }
 }
 
@@ -108,6 +182,17 @@ mod tests {
                 }
                 // Another order of at most 13 additions of values below 10.
                 prop_assert!((even[i] - e).abs() < 1e-12 && (odd[i] - o).abs() < 1e-12);
+            }
+            let (mut alone, mut both) = (vec![9.0; n], [(); 4].map(|()| vec![9.0; n]));
+            even_sums(&rows, &taps_e, &mut alone);
+            prop_assert_eq!(&alone, &even);
+            let [re, im, mirror_re, mirror_im] = both.each_mut().map(|line| &mut line[..]);
+            let reversed: Vec<&[f64]> = rows.iter().rev().copied().collect();
+            mirrored_sums([&rows, &reversed], &taps_e, &taps_o, re, im, mirror_re, mirror_im);
+            for i in 0..n {
+                // Reversed rows change the sign of the odd sum.
+                let expected = [even[i] + odd[i], odd[i] + even[i], even[i] - odd[i], odd[i] - even[i]];
+                prop_assert_eq!(both.each_ref().map(|line| line[i]), expected);
             }
         }
     }

@@ -19,6 +19,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::control::Control;
@@ -52,12 +53,13 @@ pub fn immerkaer_noise(
     let (rows, columns) = ((height - 2) / BLOCK, (width - 2) / BLOCK);
     let bands = (0..rows).into_par_iter().map(|band| {
         control.check()?;
-        let mut sums = vec![0.0f64; columns];
+        let mut sums = vec![[0.0f32; BLOCK]; columns];
         for y in 0..BLOCK {
             let at = |dy: usize| &plane[(band * BLOCK + y + dy) * width..][..width];
             add_row(at(0), at(1), at(2), &mut sums);
         }
-        Ok(sums)
+        let total = |sums: &[f32; BLOCK]| sums.iter().map(|&sum| f64::from(sum)).sum();
+        Ok(sums.iter().map(total).collect::<Vec<f64>>())
     });
     let mut means: Vec<f64> = bands.collect::<Result<Vec<_>>>()?.concat();
     means.retain(|mean| !mean.is_nan());
@@ -69,18 +71,17 @@ pub fn immerkaer_noise(
     Ok(BIAS * FRAC_PI_2.sqrt() / 6.0 * *sum / (BLOCK * BLOCK) as f64)
 }
 
-/// Adds the absolute responses of one row to the sum of each block.
-fn add_row(above: &[f32], here: &[f32], below: &[f32], sums: &mut [f64]) {
-    for (block, sum) in sums.iter_mut().enumerate() {
+/// Adds the absolute responses of one row to the sums of each block, one for each of its columns.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_row(above: &[f32], here: &[f32], below: &[f32], sums: &mut [[f32; BLOCK]]) {
+    for (block, sums) in sums.iter_mut().enumerate() {
         let [above, here, below] =
             [above, here, below].map(|row| &row[block * BLOCK..][..BLOCK + 2]);
-        let mut total = 0.0f32;
         for x in 0..BLOCK {
             let outer = above[x] + above[x + 2] + below[x] + below[x + 2];
             let cross = above[x + 1] + below[x + 1] + here[x] + here[x + 2];
-            total += (outer - 2.0 * cross + 4.0 * here[x + 1]).abs();
+            sums[x] += (outer - 2.0 * cross + 4.0 * here[x + 1]).abs();
         }
-        *sum += f64::from(total);
     }
 }
 

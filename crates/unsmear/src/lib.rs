@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | 0 | [`error`], [`real`] | failures; `f32` and `f64` |
 //! | 1 | [`border`], [`control`], [`flow_field`] | picture edges; cancellation; a field of motion |
-//! | 2 | `array`, [`fourier`] | shape checks, rows in parallel; planned transforms |
+//! | 2 | `array`, `awake`, [`fourier`] | shape checks, rows in parallel; threads that do not sleep; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
 //! | 4 | `smoothing`, `spline_filter`, `spline_values`, [`median`], [`immerkaer_noise`] | Gaussian; splines; median; noise |
@@ -17,19 +17,22 @@
 //! | 5 | `halving` | half the size |
 //! | 6 | [`pyramid`] | sizes of pictures |
 //! | 5 | [`gabor`], [`interpolate`] | filters tuned to a wavevector, complex responses; pictures between pixels, warping |
-//! | 6 | `gabor::respond` | its passes |
+//! | 6 | `gabor::stream` | its passes, row by row |
+//! | 7 | `gabor::respond` | a whole picture |
 //! | 6 | `demodulation`, [`spatiotemporal`], [`component_tests`] | derivative of responses; filters in space and time; what to believe |
 //! | 7 | [`phase_gradient`] | phase in space |
 //! | 8 | [`component_velocity`] | what one filter sees of the motion |
+//! | 8 | `flow::coarse_to_fine::response_pair` | rows of responses to two frames |
 //! | 8 | [`flow`], [`flow::thesis::bank`], `flow::coarse_to_fine::recorded`, `flow::coarse_to_fine::exponential`, `flow::coarse_to_fine::rows` | an estimate of flow, with confidence; the founding filters; frames as they come; parts of the default flow |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
-//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible`, `flow::coarse_to_fine::lighting` | parts of the default flow |
-//! | 10 | `flow::coarse_to_fine::relight`, `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
-//! | 11 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still`, `flow::coarse_to_fine::precision`, `flow::coarse_to_fine::confidence`, `flow::coarse_to_fine::round_trip` | |
-//! | 12 | `flow::coarse_to_fine::level` | one scale |
-//! | 13 | `flow::coarse_to_fine::refine`, `flow::coarse_to_fine::frames`, `flow::coarse_to_fine::noise_rule` | |
-//! | 14 | `flow::coarse_to_fine::schedule` | from coarse to fine |
-//! | 15 | [`flow::coarse_to_fine`] | the default flow |
+//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::slope`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible`, `flow::coarse_to_fine::lighting` | parts of the default flow |
+//! | 10 | `flow::coarse_to_fine::relight`, `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::look`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
+//! | 11 | `flow::coarse_to_fine::constraints`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still`, `flow::coarse_to_fine::confidence`, `flow::coarse_to_fine::round_trip` | |
+//! | 12 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::precision` | |
+//! | 13 | `flow::coarse_to_fine::level` | one scale |
+//! | 14 | `flow::coarse_to_fine::refine`, `flow::coarse_to_fine::frames`, `flow::coarse_to_fine::noise_rule` | |
+//! | 15 | `flow::coarse_to_fine::schedule` | from coarse to fine |
+//! | 16 | [`flow::coarse_to_fine`] | the default flow |
 //! | 9 | [`flow::thesis::components`], [`flow::thesis::gated_mean`], [`flow::thesis::pruned`] | parts of the founding method |
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
@@ -64,6 +67,7 @@
 #![deny(unsafe_code)]
 
 mod array;
+mod awake;
 pub mod blur;
 pub mod border;
 pub mod component_tests;

@@ -16,6 +16,7 @@
 //! filters. Sources: P. J. Burt & E. H. Adelson 1983 (doi 10.1109/TCOM.1983.1095851) for the
 //! pyramid; R. G. Keys 1981 (doi 10.1109/TASSP.1981.1163711) for the cubic.
 
+use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2};
 
 use crate::array::for_each_row_with;
@@ -66,8 +67,7 @@ pub fn resample<T: Real>(
     for_each_row_with(target, width, control, scratch, |y, out, line| {
         line.fill(T::zero());
         for (&k, &weight) in down.samples(y).zip(down.weights(y)) {
-            let row = &source[k * columns..(k + 1) * columns];
-            line.iter_mut().zip(row).for_each(|(sum, &s)| *sum += weight * s);
+            add(&source[k * columns..(k + 1) * columns], weight, line);
         }
         match kind {
             Resampling::Linear if columns == 2 * width => halve(line, out),
@@ -83,6 +83,14 @@ pub fn resample<T: Real>(
     Ok(out)
 }
 
+/// Adds a line times `weight`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add<T: Real>(line: &[T], weight: T, sums: &mut [T]) {
+    for (sum, &s) in sums.iter_mut().zip(line) {
+        *sum += weight * s;
+    }
+}
+
 /// [`Resampling::Linear`] to half the samples: with the same bits as the general form, in vectors.
 fn halve<T: Real>(line: &[T], out: &mut [T]) {
     let half = T::of(0.5);
@@ -92,18 +100,24 @@ fn halve<T: Real>(line: &[T], out: &mut [T]) {
 }
 
 /// [`Resampling::Linear`] to twice the samples, likewise.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn double<T: Real>(line: &[T], out: &mut [T]) {
     let (near, far) = (T::of(0.75), T::of(0.25));
-    let pair = |before: T, here: T, after: T| {
-        [T::zero() + far * before + near * here, T::zero() + near * here + far * after]
-    };
     let last = line.len() - 1;
-    for (around, out) in line.windows(3).zip(out[2.min(2 * last)..].chunks_exact_mut(2)) {
-        out.copy_from_slice(&pair(around[0], around[1], around[2]));
+    let pairs = out.as_chunks_mut::<2>().0;
+    let inner = last.saturating_sub(1);
+    if inner > 0 {
+        let (before, here, after) = (&line[..inner], &line[1..=inner], &line[2..][..inner]);
+        let pairs = &mut pairs[1..=inner];
+        for x in 0..inner {
+            pairs[x][0] = T::zero() + far * before[x] + near * here[x];
+            pairs[x][1] = T::zero() + near * here[x] + far * after[x];
+        }
     }
     for i in [0, last] {
         let (before, after) = (line[i.saturating_sub(1)], line[(i + 1).min(last)]);
-        out[2 * i..2 * i + 2].copy_from_slice(&pair(before, line[i], after));
+        pairs[i][0] = T::zero() + far * before + near * line[i];
+        pairs[i][1] = T::zero() + near * line[i] + far * after;
     }
 }
 

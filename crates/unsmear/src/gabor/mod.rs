@@ -31,6 +31,7 @@ use crate::real::Real;
 mod parameters;
 mod respond;
 mod responses;
+pub(crate) mod stream;
 mod taps;
 
 pub use parameters::GaborParameters;

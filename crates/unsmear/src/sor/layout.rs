@@ -11,7 +11,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::system::SorSystem;
+use super::system::SystemRows;
 use crate::control::Control;
 use crate::error::Result;
 
@@ -35,6 +35,9 @@ pub(super) const SOUTH: usize = 8;
 pub(super) const BLACK: usize = 9;
 /// Half-rows of a coefficient row.
 const HALF_ROWS: usize = 14;
+
+/// Rows that one task sorts: the diffusivities of the row before are made once more for each.
+const ROWS_PER_TASK: usize = 16;
 
 /// Half-rows of a field row.
 const FIELD_ROWS: usize = 4;
@@ -71,7 +74,7 @@ impl Layout {
     /// Inverts the equations and sorts them and (u, v) by colour.
     pub(super) fn pack(
         &self,
-        system: &SorSystem<'_>,
+        system: &impl SystemRows,
         u: &[f32],
         v: &[f32],
         coefficients: &mut [f32],
@@ -80,51 +83,44 @@ impl Layout {
     ) -> Result<()> {
         let inner = |row: usize| row..row * (self.height + 1);
         coefficients[inner(self.block())]
-            .par_chunks_exact_mut(self.block())
-            .zip(field[inner(self.rows())].par_chunks_exact_mut(self.rows()))
+            .par_chunks_mut(ROWS_PER_TASK * self.block())
+            .zip(field[inner(self.rows())].par_chunks_mut(ROWS_PER_TASK * self.rows()))
             .enumerate()
-            .with_min_len(LANES)
-            .try_for_each_init(
-                || vec![0.0; 7 * self.width + 1],
-                |scratch, (y, (block, rows))| {
+            .try_for_each(|(task, (blocks, rows))| {
+                let first = task * ROWS_PER_TASK;
+                let mut made = MadeRows::new(self.width);
+                if first > 0 {
+                    made.before(system, [u, v], first);
+                }
+                let rows = rows.chunks_exact_mut(self.rows());
+                for (i, (block, rows)) in
+                    blocks.chunks_exact_mut(self.block()).zip(rows).enumerate()
+                {
                     control.check()?;
-                    self.pack_row(system, u, v, y, block, rows, scratch);
-                    Ok(())
-                },
-            )
+                    let y = first + i;
+                    made.next(system, [u, v], y, y + 1 == self.height);
+                    let row = y * self.width..(y + 1) * self.width;
+                    self.pack_row(&mut made, [&u[row.clone()], &v[row]], y % 2, block, rows);
+                }
+                Ok(())
+            })
     }
 
     fn pack_row(
         &self,
-        system: &SorSystem<'_>,
-        u: &[f32],
-        v: &[f32],
-        y: usize,
+        made: &mut MadeRows,
+        [u, v]: [&[f32]; 2],
+        parity: usize,
         block: &mut [f32],
         rows: &mut [f32],
-        scratch: &mut [f32],
     ) {
-        let (width, parity) = (self.width, y % 2);
-        let row = |y: usize| y * width..(y + 1) * width;
-        let (edges, scratch) = scratch.split_at_mut(width + 1);
-        edges[1..width].copy_from_slice(&system.gx[row(y)][..width - 1]);
-        (edges[0], edges[width]) = (0.0, 0.0);
-        let (zeros, scratch) = scratch.split_at_mut(width);
-        zeros.fill(0.0);
-        let north = if y > 0 { &system.gy[row(y - 1)] } else { &*zeros };
-        let south = if y + 1 < self.height { &system.gy[row(y)] } else { &*zeros };
-        let (u, v) = (&u[row(y)], &v[row(y)]);
-        let mut outputs = scratch.chunks_exact_mut(width);
-        if let (Some(i11), Some(i12), Some(i22), Some(c1), Some(c2)) =
-            (outputs.next(), outputs.next(), outputs.next(), outputs.next(), outputs.next())
-        {
-            let [a11, a12, a22, b1, b2] =
-                [system.a11, system.a12, system.a22, system.c1, system.c2]
-                    .map(|plane| &plane[row(y)]);
-            let planes = [a11, a12, a22, b1, b2, u, v, north, south, edges];
-            invert_row(planes, i11, i12, i22, c1, c2);
-        }
-        for (i, plane) in scratch.chunks_exact(width).enumerate() {
+        let width = self.width;
+        let MadeRows { data, edges, north, south, inverse } = made;
+        let [a11, a12, a22, b1, b2] = data.each_ref().map(|row| &row[..]);
+        let planes = [a11, a12, a22, b1, b2, u, v, north, south, edges];
+        let [i11, i12, i22, c1, c2] = inverse.each_mut().map(|row| &mut row[..]);
+        invert_row(planes, i11, i12, i22, c1, c2);
+        for (i, plane) in inverse.iter().enumerate() {
             self.split(plane, parity, block, RED + i, BLACK + i);
         }
         self.split(u, parity, rows, 0, 2);
@@ -160,6 +156,47 @@ impl Layout {
                 interleave(half(order[0]), half(order[1]), u);
                 interleave(half(order[0] + 1), half(order[1] + 1), v);
             });
+    }
+}
+
+/// One row of the equations as it is asked for, and its inverse.
+struct MadeRows {
+    data: [Vec<f32>; 5],
+    /// Diffusivities from the western border to the eastern, both 0.
+    edges: Vec<f32>,
+    north: Vec<f32>,
+    south: Vec<f32>,
+    inverse: [Vec<f32>; 5],
+}
+
+impl MadeRows {
+    fn new(width: usize) -> Self {
+        let row = || vec![0.0; width];
+        Self {
+            data: [(); 5].map(|()| row()),
+            edges: vec![0.0; width + 1],
+            north: row(),
+            south: row(),
+            inverse: [(); 5].map(|()| row()),
+        }
+    }
+
+    /// Makes what row `y` needs of the row before.
+    fn before(&mut self, system: &impl SystemRows, start: [&[f32]; 2], y: usize) {
+        let width = self.south.len();
+        system.diffusivities(y - 1, start, [&mut self.edges[1..=width], &mut self.south]);
+    }
+
+    /// Makes row `y`, the one after the last made.
+    fn next(&mut self, system: &impl SystemRows, start: [&[f32]; 2], y: usize, last: bool) {
+        let width = self.south.len();
+        std::mem::swap(&mut self.north, &mut self.south);
+        system.data(y, start, self.data.each_mut().map(|row| &mut row[..]));
+        system.diffusivities(y, start, [&mut self.edges[1..=width], &mut self.south]);
+        (self.edges[0], self.edges[width]) = (0.0, 0.0);
+        if last {
+            self.south.fill(0.0);
+        }
     }
 }
 

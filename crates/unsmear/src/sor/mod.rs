@@ -23,14 +23,15 @@ mod layout;
 mod relax;
 mod system;
 
+use rayon::iter::repeat_n;
 use rayon::prelude::*;
 
 use crate::control::Control;
-use crate::error::{Result, require};
+use crate::error::{Error, Result, require};
 use layout::{LANES, Layout};
 use relax::{Band, relax_band};
 
-pub use system::SorSystem;
+pub use system::{SorSystem, SystemRows};
 
 /// Half-sweeps per pass: 11 rows of 640 px are 260 kB, well inside a second-level cache.
 const HALVES_PER_PASS: usize = 10;
@@ -38,12 +39,29 @@ const HALVES_PER_PASS: usize = 10;
 /// Fewest pixels worth a thread of their own: a pass over them takes some 40 us, ten times its scheduling.
 const PIXELS_PER_BAND: usize = 16384;
 
+/// Samples of fresh memory that one thread clears at a time: the system hands it out page by page meanwhile.
+const SAMPLES_AT_ONCE: usize = 1 << 16;
+
 /// Memory of [`solve`], 36 B/px; reusable between calls of any size.
 #[derive(Debug, Default)]
 pub struct SorScratch {
     layout: Layout,
     coefficients: Vec<f32>,
     field: Vec<f32>,
+}
+
+impl SorScratch {
+    /// With room for pictures of up to `height` x `width`.
+    #[must_use]
+    pub fn with_room(height: usize, width: usize) -> Self {
+        let layout = Layout::new(height, width);
+        let room = |per_row: usize| Vec::with_capacity((height + 2) * per_row + LANES);
+        Self {
+            layout: Layout::default(),
+            coefficients: room(layout.block()),
+            field: room(layout.rows()),
+        }
+    }
 }
 
 /// Runs `sweeps` sweeps with relaxation `omega` on (`u`, `v`) in place; see the [module](self).
@@ -61,18 +79,40 @@ pub fn solve(
     control: &Control,
 ) -> Result<()> {
     system.check(u, v)?;
+    solve_rows(system, [system.height, system.width], u, v, omega, sweeps, scratch, control)
+}
+
+/// Like [`solve`], with equations made row by row for a picture of `[height, width]`.
+///
+/// # Errors
+/// [`Error::Shape`](crate::Error::Shape) when `u` or `v` has not height x width samples; else as [`solve`].
+pub fn solve_rows(
+    system: &impl SystemRows,
+    [height, width]: [usize; 2],
+    u: &mut [f32],
+    v: &mut [f32],
+    omega: f32,
+    sweeps: usize,
+    scratch: &mut SorScratch,
+    control: &Control,
+) -> Result<()> {
+    for (argument, got) in [("u", u.len()), ("v", v.len())] {
+        if got != height * width {
+            return Err(Error::shape(argument, format!("({height} x {width},)"), &[got]));
+        }
+    }
     require("omega", f64::from(omega), "in (0, 2)", |o| 0.0 < o && o < 2.0)?;
     if u.is_empty() || sweeps == 0 {
         return Ok(());
     }
-    let layout = Layout::new(system.height, system.width);
+    let layout = Layout::new(height, width);
     let SorScratch { layout: former, coefficients, field } = scratch;
     if *former != layout {
         // Padding is zero and stays so.
         *former = layout;
         for (values, per_row) in [(&mut *coefficients, layout.block()), (field, layout.rows())] {
-            values.clear();
-            values.resize((layout.height + 2) * per_row + LANES, 0.0);
+            let samples = (layout.height + 2) * per_row + LANES;
+            repeat_n(0.0, samples).with_min_len(SAMPLES_AT_ONCE).collect_into_vec(values);
         }
     }
     let (coefficients, field) = (aligned(coefficients), aligned(field));

@@ -1,4 +1,4 @@
-//! The equations that [`super`] relaxes, as packed planes.
+//! The equations that [`super`] relaxes: made row by row when they are wanted, or kept as packed planes.
 
 use crate::error::{Error, Result};
 
@@ -23,6 +23,34 @@ pub struct SorSystem<'a> {
     pub height: usize,
     /// Columns.
     pub width: usize,
+}
+
+/// Equations made row by row, linear around the planes `[u, v]` that the solution starts from. Rows are asked for in
+/// any order, from several threads, and more than once.
+pub trait SystemRows: Sync {
+    /// Fills rows `[a11, a12, a22, c1, c2]` of row `y`.
+    fn data(&self, y: usize, start: [&[f32]; 2], out: [&mut [f32]; 5]);
+
+    /// Fills rows `[gx, gy]` of row `y`; see [`SorSystem`].
+    fn diffusivities(&self, y: usize, start: [&[f32]; 2], out: [&mut [f32]; 2]);
+}
+
+impl SorSystem<'_> {
+    fn copy<const N: usize>(&self, planes: [&[f32]; N], y: usize, out: [&mut [f32]; N]) {
+        for (plane, out) in planes.into_iter().zip(out) {
+            out.copy_from_slice(&plane[y * self.width..(y + 1) * self.width]);
+        }
+    }
+}
+
+impl SystemRows for SorSystem<'_> {
+    fn data(&self, y: usize, _: [&[f32]; 2], out: [&mut [f32]; 5]) {
+        self.copy([self.a11, self.a12, self.a22, self.c1, self.c2], y, out);
+    }
+
+    fn diffusivities(&self, y: usize, _: [&[f32]; 2], out: [&mut [f32]; 2]) {
+        self.copy([self.gx, self.gy], y, out);
+    }
 }
 
 impl SorSystem<'_> {

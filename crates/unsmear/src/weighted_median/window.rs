@@ -96,7 +96,7 @@ impl<'a> Window<'a> {
                 let centre = y * self.width + x;
                 gather_inner(self, corner, centre, u, v, squares, weights);
             } else {
-                self.gather_outer(y, x, u, v, weights);
+                gather_outer(self, y, x, u, v, squares, weights);
             }
             (out_u[x], out_v[x]) = weighted_middles(u, v, weights, keys);
         }
@@ -111,30 +111,38 @@ impl<'a> Window<'a> {
             && x + radius < self.width
             && last * self.width + x - radius + copied(radius) <= self.height * self.width
     }
+}
 
-    /// Gathers any window.
-    fn gather_outer(&self, y: usize, x: usize, u: &mut [f32], v: &mut [f32], weights: &mut [i32]) {
-        let (radius, side) = (self.radius, 2 * self.radius + 1);
-        let centre = y * self.width + x;
-        weights.fill(0);
-        for i in 0..side * side {
-            let (Some(y), Some(x)) =
-                ((y + i / side).checked_sub(radius), (x + i % side).checked_sub(radius))
-            else {
-                continue;
-            };
-            if y < self.height && x < self.width {
-                let q = y * self.width + x;
-                let mut square = 0.0;
-                for plane in self.guide {
-                    let difference = plane[q] - plane[centre];
-                    square += difference * difference;
-                }
-                weights[i] = weight(self.spatial[i] + square * self.ranged);
-                (u[i], v[i]) = (self.flow[0][q], self.flow[1][q]);
+/// Gathers any window; what lies outside the picture is infinitely far.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn gather_outer(
+    window: &Window<'_>,
+    y: usize,
+    x: usize,
+    u: &mut [f32],
+    v: &mut [f32],
+    squares: &mut [f32],
+    weights: &mut [i32],
+) {
+    let (radius, side, width) = (window.radius, 2 * window.radius + 1, window.width);
+    let [plane_u, plane_v] = window.flow;
+    let (left, right) = (x.saturating_sub(radius), (x + radius + 1).min(width));
+    squares.fill(f32::INFINITY);
+    for row in y.saturating_sub(radius)..(y + radius + 1).min(window.height) {
+        let start = (row + radius - y) * side + left + radius - x;
+        let (to, from) = (start..start + right - left, row * width + left..row * width + right);
+        u[to.clone()].copy_from_slice(&plane_u[from.clone()]);
+        v[to.clone()].copy_from_slice(&plane_v[from.clone()]);
+        let squares = &mut squares[to];
+        squares.fill(0.0);
+        for plane in window.guide {
+            let centre = plane[y * width + x];
+            for (square, sample) in squares.iter_mut().zip(&plane[from.clone()]) {
+                *square += (sample - centre) * (sample - centre);
             }
         }
     }
+    weigh(window, squares, weights);
 }
 
 /// Gathers a window whose copies stay in the picture's memory; `corner` and `centre` index the planes.
@@ -162,7 +170,12 @@ fn gather_inner(
             copy_lanes(&sums, &mut squares[to + part..]);
         }
     }
-    // Spare samples have an infinite spatial exponent, hence no weight.
+    weigh(window, squares, weights);
+}
+
+/// Weights of gathered samples; spare ones have an infinite spatial exponent, hence none.
+#[inline(always)]
+fn weigh(window: &Window<'_>, squares: &[f32], weights: &mut [i32]) {
     let n = weights.len() / RUN * RUN;
     let (spatial, squares, weights) = (&window.spatial[..n], &squares[..n], &mut weights[..n]);
     let ranged = window.ranged;

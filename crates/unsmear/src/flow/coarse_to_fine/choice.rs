@@ -14,14 +14,14 @@
 //! [`WORST_BIAS`] (acceleration: small errors that all point the same way). Else `w_S` holds wherever
 //! `E(w_S) < 2 E(w_2) + 0.02`, and where it leads out of the next frame, which then cannot judge. `G_s *` is a Gaussian average of deviation s px.
 
-use ndarray::{Array2, Zip};
+use multiversion::multiversion;
+use ndarray::{Array2, ArrayView2, Zip};
 
-use super::phase_constraint::TERMS;
-use crate::array::for_each_row;
+use super::look::Look;
+use super::phase_constraint::{Filters, TERMS};
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
-use crate::gabor::Responses;
 use crate::pyramid::smooth;
 
 /// Ratio of the mean mismatches above which several frames are given up.
@@ -47,11 +47,9 @@ pub(super) struct Mismatch {
     pub(super) bias: f64,
 }
 
-/// What [`mismatch`] looks at: responses, weights and constraints of the warped next frame.
-pub(super) struct Explanation<'a> {
-    pub(super) responses: [&'a Responses<f32>; 2],
-    pub(super) visible: &'a [f32],
-    pub(super) constraints: &'a [f32],
+/// Constants of [`mismatch`].
+#[derive(Clone, Copy)]
+pub(super) struct Yardstick {
     /// `r^2`.
     pub(super) floor: f32,
     /// `s`.
@@ -60,63 +58,98 @@ pub(super) struct Explanation<'a> {
     pub(super) residual: f32,
 }
 
-/// Measures `E` and the bias.
+/// Planes that are summed over the filters: `W_0`, `W_0 (1 - q cos D)`, and the sums of `delta`: `a11, a12, a22, b1, b2`.
+const SUMS: usize = 7;
+
+/// Measures `E` and the bias in a look at the next frame.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub(super) fn mismatch(seen: &Explanation<'_>, control: &Control) -> Result<Mismatch> {
-    let (filters, height, width) = seen.responses[0].dim();
-    let sum = |term: fn([f32; 4], f32) -> f32| -> Result<Array2<f32>> {
-        let mut out = Array2::<f32>::zeros((height, width));
-        let samples = out.as_slice_mut().unwrap_or_default();
-        for_each_row(samples, width, control, |y, out| {
-            let visible = &seen.visible[y * width..(y + 1) * width];
-            for j in 0..filters {
-                let [(a, b), (c, d)] = seen.responses.map(|r| r.row(j, y));
-                for (x, out) in out.iter_mut().enumerate() {
-                    *out += visible[x] * term([a[x], b[x], c[x], d[x]], seen.floor);
-                }
-            }
-        })?;
-        smooth(out.view(), SIGMA[0], control)
-    };
-    let weight = sum(|[a, b, ..], floor| {
-        let power = a * a + b * b;
-        power / (power + floor)
+pub(super) fn mismatch(
+    look: &Look<'_>,
+    filters: &Filters,
+    yardstick: Yardstick,
+    control: &Control,
+) -> Result<Mismatch> {
+    let (count, width) = (look.filters(), look.width);
+    let mut sums = [(); SUMS].map(|()| vec![0.0; look.height * width]);
+    let planes = sums.each_mut().map(|plane| &mut plane[..]);
+    let scratch = || vec![0.0; count * TERMS * width];
+    look.for_each_row(planes, [width; SUMS], control, scratch, |y, pair, seen, rows, terms| {
+        filters.constrain(y, pair, seen, terms);
+        let [weight, lost, a11, a12, a22, b1, b2] = rows;
+        for (j, terms) in terms.chunks_exact(TERMS * width).enumerate() {
+            add_loss(pair.here(j), seen, yardstick.floor, weight, lost);
+            add_bias(terms, yardstick, a11, a12, a22, b1, b2);
+        }
     })?;
-    let lost = sum(|[a, b, c, d], floor| {
-        let (power, both) = (a * a + b * b, a * a + b * b + c * c + d * d);
-        let alike = if both > 0.0 { 2.0 * (a * c + b * d) / both } else { 1.0 };
-        power / (power + floor) * (1.0 - alike)
-    })?;
-    let map = Zip::from(&lost).and(&weight).map_collect(|l, w| l / (w + 0.05));
-    let bias = bias(seen, control)?;
-    Ok(Mismatch { map, weight, bias })
+    judge(sums, width, control)
 }
 
-/// Mean of `|delta|`.
-fn bias(seen: &Explanation<'_>, control: &Control) -> Result<f64> {
-    let (filters, height, width) = seen.responses[0].dim();
-    let sum = |term: fn([f32; 3]) -> f32| -> Result<Array2<f32>> {
-        let mut out = Array2::<f32>::zeros((height, width));
-        let samples = out.as_slice_mut().unwrap_or_default();
-        for_each_row(samples, width, control, |y, out| {
-            let row = &seen.constraints[y * filters * TERMS * width..][..filters * TERMS * width];
-            for terms in row.chunks_exact(TERMS * width) {
-                for (x, out) in out.iter_mut().enumerate() {
-                    let [gx, gy, d, w] = [0, 1, 2, 3].map(|term| terms[term * width + x]);
-                    let r = d / seen.residual;
-                    *out += seen.scale * w / (1.0 + r * r) * term([gx, gy, d]);
-                }
-            }
-        })?;
-        smooth(out.view(), SIGMA[1], control)
+/// Adds one filter's `W_0` and `W_0 (1 - q cos D)` on a row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_loss(
+    responses: [(&[f32], &[f32]); 2],
+    seen: &[f32],
+    floor: f32,
+    weight: &mut [f32],
+    lost: &mut [f32],
+) {
+    let n = weight.len();
+    let (seen, lost) = (&seen[..n], &mut lost[..n]);
+    let [(a, b), (c, d)] = responses.map(|(re, im)| (&re[..n], &im[..n]));
+    for x in 0..n {
+        let power = a[x] * a[x] + b[x] * b[x];
+        let both = power + c[x] * c[x] + d[x] * d[x];
+        let product = 2.0 * (a[x] * c[x] + b[x] * d[x]);
+        let alike = if both > 0.0 { product / both } else { 1.0 };
+        let own = seen[x] * power / (power + floor);
+        weight[x] += own;
+        lost[x] += own * (1.0 - alike);
+    }
+}
+
+/// Adds one filter's `s w G G'` and `s w G D` on a row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_bias(
+    terms: &[f32],
+    yardstick: Yardstick,
+    a11: &mut [f32],
+    a12: &mut [f32],
+    a22: &mut [f32],
+    b1: &mut [f32],
+    b2: &mut [f32],
+) {
+    let n = a11.len();
+    let (a12, a22, b1, b2) = (&mut a12[..n], &mut a22[..n], &mut b1[..n], &mut b2[..n]);
+    let (gx, gy) = (&terms[..n], &terms[n..2 * n]);
+    let (step, weight) = (&terms[2 * n..3 * n], &terms[3 * n..4 * n]);
+    for x in 0..n {
+        let r = step[x] / yardstick.residual;
+        let w = yardstick.scale * weight[x] / (1.0 + r * r);
+        a11[x] += w * gx[x] * gx[x];
+        a12[x] += w * gx[x] * gy[x];
+        a22[x] += w * gy[x] * gy[x];
+        b1[x] += w * gx[x] * step[x];
+        b2[x] += w * gy[x] * step[x];
+    }
+}
+
+/// The averages of the sums, and what they say.
+fn judge(sums: [Vec<f32>; SUMS], width: usize, control: &Control) -> Result<Mismatch> {
+    let averaged = |plane: Vec<f32>, sigma: f64| {
+        let shape = (plane.len() / width, width);
+        match ArrayView2::from_shape(shape, &plane) {
+            Ok(view) => smooth(view, sigma, control),
+            Err(_) => Ok(Array2::zeros(shape)),
+        }
     };
-    let a11 = sum(|[gx, _, _]| gx * gx)?;
-    let a12 = sum(|[gx, gy, _]| gx * gy)?;
-    let a22 = sum(|[_, gy, _]| gy * gy)?;
-    let b1 = sum(|[gx, _, d]| gx * d)?;
-    let b2 = sum(|[_, gy, d]| gy * d)?;
+    let [weight, lost, a11, a12, a22, b1, b2] = sums;
+    let (weight, lost) = (averaged(weight, SIGMA[0])?, averaged(lost, SIGMA[0])?);
+    let map = Zip::from(&lost).and(&weight).map_collect(|l, w| l / (w + 0.05));
+    let (a11, a12) = (averaged(a11, SIGMA[1])?, averaged(a12, SIGMA[1])?);
+    let a22 = averaged(a22, SIGMA[1])?;
+    let (b1, b2) = (averaged(b1, SIGMA[1])?, averaged(b2, SIGMA[1])?);
     let mut total = 0.0;
     for (i, &xx) in a11.indexed_iter() {
         let (xx, xy, yy) = (f64::from(xx) + 0.01, f64::from(a12[i]), f64::from(a22[i]) + 0.01);
@@ -124,7 +157,7 @@ fn bias(seen: &Explanation<'_>, control: &Control) -> Result<f64> {
         let determinant = xx * yy - xy * xy;
         total += (yy * p - xy * q).hypot(xx * q - xy * p) / determinant;
     }
-    Ok(total / a11.len() as f64)
+    Ok(Mismatch { map, weight, bias: total / a11.len() as f64 })
 }
 
 /// Where several frames hold; nowhere when they are given up.
@@ -185,25 +218,18 @@ mod tests {
     /// One filter along x and one along y, of 1 rad/px each.
     #[test]
     fn bias_is_the_motion_that_the_constraints_still_ask_for() {
-        let mut responses = Responses::zeros(2, 30, 30);
-        for (y, j) in (0..30).flat_map(|y| [(y, 0), (y, 1)]) {
-            responses.row_mut(j, y).0.fill(5.0);
-        }
-        let mut constraints = Vec::new();
-        for _ in 0..30 {
+        let (five, none, seen) = ([5.0; 30], [0.0; 30], [1.0; 30]);
+        let yardstick = Yardstick { floor: 0.1, scale: 1.0, residual: 0.5 };
+        let mut sums = [(); SUMS].map(|()| vec![0.0; 900]);
+        for y in 0..30 {
+            let [weight, lost, a11, a12, a22, b1, b2] =
+                sums.each_mut().map(|plane| &mut plane[30 * y..30 * (y + 1)]);
             for terms in [[1.0, 0.0, 0.03, 1.0], [0.0, 1.0, -0.04, 1.0]] {
-                constraints.extend(terms.into_iter().flat_map(|term| [term; 30]));
+                add_loss([(&five, &none); 2], &seen, yardstick.floor, weight, lost);
+                add_bias(&terms.map(|t| [t; 30]).concat(), yardstick, a11, a12, a22, b1, b2);
             }
         }
-        let seen = Explanation {
-            responses: [&responses, &responses],
-            visible: &[1.0; 900],
-            constraints: &constraints,
-            floor: 0.1,
-            scale: 1.0,
-            residual: 0.5,
-        };
-        let found = mismatch(&seen, &Control::new()).unwrap();
+        let found = judge(sums, 30, &Control::new()).unwrap();
         // 0.05 px but for the 1 % of the floor and the reweighting's 0.6 %.
         assert!((found.bias - 0.05).abs() < 1e-3, "{}", found.bias);
         assert!(found.map.iter().all(|&e| e == 0.0), "equal responses agree");

@@ -22,13 +22,14 @@
 //! Reference: O. Mac Aodha, A. Humayun, M. Pollefeys, G. J. Brostow 2013 (doi
 //! 10.1109/TPAMI.2012.171) compares such signs.
 
+use multiversion::multiversion;
 use ndarray::{Array2, ArrayView2, Zip};
 
-use crate::array::{for_each_row, for_each_row_with};
+use super::look::Look;
+use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
-use crate::gabor::Responses;
 use crate::pyramid::smooth;
 
 /// Deviations of the averages of coherence, of the flow's gradient and disagreement, and of `A`, px.
@@ -57,31 +58,36 @@ pub(super) struct Clues<'a> {
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn add_coherence(
-    responses: [&Responses<f32>; 2],
-    visible: &[f32],
+    look: &Look<'_>,
     floor: f32,
     share: f32,
     sum: &mut Array2<f32>,
     control: &Control,
 ) -> Result<()> {
-    let (filters, _, width) = responses[0].dim();
     let samples = sum.as_slice_mut().unwrap_or_default();
-    let scratch = || (vec![0.0f32; width], vec![0.0f32; width]);
-    for_each_row_with(samples, width, control, scratch, |y, out, (alike, power)| {
+    let width = look.width;
+    let scratch = || [vec![0.0f32; width], vec![0.0f32; width]];
+    look.for_each_row([samples], [width], control, scratch, |_, pair, seen, [out], sums| {
+        let [alike, power] = sums;
         alike.fill(0.0);
         power.fill(0.0);
-        for j in 0..filters {
-            let [(a, b), (c, d)] = responses.map(|r| r.row(j, y));
-            for x in 0..width {
-                alike[x] += a[x] * c[x] + b[x] * d[x];
-                power[x] += 0.5 * (a[x] * a[x] + b[x] * b[x] + c[x] * c[x] + d[x] * d[x]);
-            }
-        }
-        let seen = &visible[y * width..(y + 1) * width];
+        (0..pair.filters()).for_each(|j| compare(pair.here(j), alike, power));
         for x in 0..width {
             out[x] += share * seen[x] * alike[x] / (power[x] + floor);
         }
     })
+}
+
+/// Adds one filter's `Re(conj(R_0) R_1)` and `(a_0^2 + a_1^2)/2` on a row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn compare(responses: [(&[f32], &[f32]); 2], alike: &mut [f32], power: &mut [f32]) {
+    let n = alike.len();
+    let power = &mut power[..n];
+    let [(a, b), (c, d)] = responses.map(|(re, im)| (&re[..n], &im[..n]));
+    for x in 0..n {
+        alike[x] += a[x] * c[x] + b[x] * d[x];
+        power[x] += 0.5 * (a[x] * a[x] + b[x] * b[x] + c[x] * c[x] + d[x] * d[x]);
+    }
 }
 
 /// Confidence (H, W) in [0, 1].
@@ -163,19 +169,14 @@ fn steepness(flow: &FlowField<f32>, control: &Control) -> Result<Array2<f32>> {
 mod tests {
     use super::*;
 
-    fn responses(value: f32) -> Responses<f32> {
-        let mut responses = Responses::zeros(2, 24, 24);
-        for (y, j) in (0..24).flat_map(|y| [(y, 0), (y, 1)]) {
-            responses.row_mut(j, y).1.fill(value);
-        }
-        responses
-    }
-
+    /// Coherence of two filters of the given imaginary responses, all the picture alike.
     fn coherence(one: f32, other: f32) -> Array2<f32> {
-        let mut sum = Array2::zeros((24, 24));
-        let pair = [&responses(one), &responses(other)];
-        add_coherence(pair, &[1.0; 576], 2.0, 1.0, &mut sum, &Control::new()).unwrap();
-        sum
+        let (re, one, other) = ([0.0; 24], [one; 24], [other; 24]);
+        let (mut alike, mut power) = ([0.0; 24], [0.0; 24]);
+        for _ in 0..2 {
+            compare([(&re, &one), (&re, &other)], &mut alike, &mut power);
+        }
+        Array2::from_shape_fn((24, 24), |(_, x)| alike[x] / (power[x] + 2.0))
     }
 
     #[test]

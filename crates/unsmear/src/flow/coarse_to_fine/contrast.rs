@@ -16,6 +16,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
+use multiversion::multiversion;
 use ndarray::{Array2, ArrayView3, ArrayView4, Axis};
 use rayon::prelude::*;
 
@@ -108,13 +109,7 @@ impl Contrast {
             || vec![0.0; width],
             |y, out, values| {
                 read_row(frame.index_axis(Axis(0), y), reading, values);
-                let mut sound = true;
-                for (out, &s) in out.iter_mut().zip(&*values) {
-                    sound &= s.is_finite();
-                    *out =
-                        if s.is_finite() { ((s - self.mean) * self.gain) as f32 } else { f32::NAN };
-                }
-                if !sound {
+                if !standardise(values, self.mean, self.gain, out) {
                     unknown.store(true, Relaxed);
                 }
             },
@@ -125,28 +120,15 @@ impl Contrast {
 
 impl Moments {
     fn of(values: &[f64], pivot: f64) -> Self {
-        let (mut count, mut sum) = ([0.0; LANES], [0.0; LANES]);
-        let (mut squares, mut largest) = ([0.0; LANES], [0.0f64; LANES]);
-        let mut add = |lane: usize, value: f64| {
-            let known = value.is_finite();
-            let (one, offset) = if known { (1.0, value - pivot) } else { (0.0, 0.0) };
-            let size = if known { value.abs() } else { 0.0 };
-            count[lane] += one;
-            sum[lane] += offset;
-            squares[lane] += offset * offset;
-            largest[lane] = if size > largest[lane] { size } else { largest[lane] };
-        };
+        let mut lanes = [[0.0; LANES]; 4];
+        let [count, sum, squares, largest] = &mut lanes;
         let (blocks, rest) = values.as_chunks::<LANES>();
-        for block in blocks {
-            (0..LANES).for_each(|lane| add(lane, block[lane]));
-        }
-        rest.iter().enumerate().for_each(|(lane, &value)| add(lane, value));
-        Self {
-            count: count.iter().sum(),
-            sum: sum.iter().sum(),
-            squares: squares.iter().sum(),
-            largest: largest.into_iter().fold(0.0, f64::max),
-        }
+        add(blocks, pivot, count, sum, squares, largest);
+        let mut last = [f64::NAN; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        add(&[last], pivot, count, sum, squares, largest);
+        let [count, sum, squares] = [count, sum, squares].map(|lanes| lanes.iter().sum());
+        Self { count, sum, squares, largest: largest.iter().copied().fold(0.0, f64::max) }
     }
 
     fn and(self, other: Self) -> Self {
@@ -157,6 +139,43 @@ impl Moments {
             largest: self.largest.max(other.largest),
         }
     }
+}
+
+/// Adds known values, their distances from `pivot` and the squares of these, lane by lane.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add(
+    blocks: &[[f64; LANES]],
+    pivot: f64,
+    count: &mut [f64; LANES],
+    sum: &mut [f64; LANES],
+    squares: &mut [f64; LANES],
+    largest: &mut [f64; LANES],
+) {
+    for block in blocks {
+        for lane in 0..LANES {
+            let value = block[lane];
+            let known = value.abs() < f64::INFINITY;
+            let offset = if known { value - pivot } else { 0.0 };
+            let size = if known { value.abs() } else { 0.0 };
+            count[lane] += if known { 1.0 } else { 0.0 };
+            sum[lane] += offset;
+            squares[lane] += offset * offset;
+            largest[lane] = if size > largest[lane] { size } else { largest[lane] };
+        }
+    }
+}
+
+/// `gain (s - mean)`, NaN where unknown; whether all are known.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn standardise(values: &[f64], mean: f64, gain: f64, out: &mut [f32]) -> bool {
+    let n = out.len();
+    let mut unknown = 0;
+    for x in 0..n {
+        let known = values[..n][x].abs() < f64::INFINITY;
+        out[x] = if known { ((values[x] - mean) * gain) as f32 } else { f32::NAN };
+        unknown += u32::from(!known);
+    }
+    unknown == 0
 }
 
 #[cfg(test)]

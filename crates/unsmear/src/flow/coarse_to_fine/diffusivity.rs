@@ -17,46 +17,36 @@
 
 use multiversion::multiversion;
 
-use super::rows::{Planes, for_each_rows};
-use crate::control::Control;
-use crate::error::Result;
+use super::rows::Planes;
 
 /// Difference of flow below which smoothing is quadratic, px.
 const EPSILON: f32 = 0.02;
 
-/// Fills `gx` (between x and x + 1) and `gy` (between y and y + 1).
-///
-/// # Errors
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// Fills row `y` of `gx` (between x and x + 1) and `gy` (between y and y + 1), from planes (H, W).
 pub(super) fn diffusivities(
+    y: usize,
     [u, v]: Planes<'_>,
     [edge_x, edge_y]: Planes<'_>,
     alpha: f32,
     [gx, gy]: [&mut [f32]; 2],
-    width: usize,
-    control: &Control,
-) -> Result<()> {
+) {
+    let width = gx.len();
     let height = u.len() / width;
-    for_each_rows([gx, gy], [width; 2], control, |y, [gx, gy]| {
-        let row = |plane: &'_ [f32], y: usize| -> std::ops::Range<usize> {
-            y * width..((y + 1) * width).min(plane.len())
-        };
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1), (y + 2).min(height - 1)];
-        let u = rows.map(|y| &u[row(u, y)]);
-        let v = rows.map(|y| &v[row(v, y)]);
-        between_columns(&u, &v, &edge_x[row(edge_x, y)], alpha, gx);
-        gx[width - 1] = 0.0;
-        if y + 1 == height {
-            gy.fill(0.0);
-            return;
-        }
-        between_rows(&u, &v, &edge_y[row(edge_y, y)], alpha, gy);
-        for x in [0, width - 1] {
-            let at = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
-            let steep = steepness_down(&u, at) + steepness_down(&v, at);
-            gy[x] = alpha * edge_y[y * width + x] / (steep + EPSILON * EPSILON).sqrt();
-        }
-    })
+    let row = |y: usize| y * width..(y + 1) * width;
+    let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1), (y + 2).min(height - 1)];
+    let (u, v) = (rows.map(|y| &u[row(y)]), rows.map(|y| &v[row(y)]));
+    between_columns(&u, &v, &edge_x[row(y)], alpha, gx);
+    gx[width - 1] = 0.0;
+    if y + 1 == height {
+        gy.fill(0.0);
+        return;
+    }
+    between_rows(&u, &v, &edge_y[row(y)], alpha, gy);
+    for x in [0, width - 1] {
+        let at = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
+        let steep = steepness_down(&u, at) + steepness_down(&v, at);
+        gy[x] = alpha * edge_y[y * width + x] / (steep + EPSILON * EPSILON).sqrt();
+    }
 }
 
 /// Rows y - 1, y, y + 1 and y + 2 of a component.
@@ -112,8 +102,9 @@ mod tests {
         };
         let (u, v, ones) = (field(0.3, -0.1), field(0.2, 0.5), vec![1.0; height * width]);
         let (mut gx, mut gy) = (vec![9.0; height * width], vec![9.0; height * width]);
-        diffusivities([&u, &v], [&ones, &ones], 2.0, [&mut gx, &mut gy], width, &Control::new())
-            .unwrap();
+        for (y, (gx, gy)) in gx.chunks_mut(width).zip(gy.chunks_mut(width)).enumerate() {
+            diffusivities(y, [&u, &v], [&ones, &ones], 2.0, [gx, gy]);
+        }
         let expected = 2.0 / (0.09f32 + 0.01 + 0.04 + 0.25 + EPSILON * EPSILON).sqrt();
         for y in 1..height - 1 {
             for x in 1..width - 1 {
@@ -129,8 +120,8 @@ mod tests {
     #[test]
     fn a_constant_flow_diffuses_most() {
         let (u, e) = (vec![1.5; 12], vec![0.5; 12]);
-        let (mut gx, mut gy) = (vec![0.0; 12], vec![0.0; 12]);
-        diffusivities([&u, &u], [&e, &e], 1.0, [&mut gx, &mut gy], 4, &Control::new()).unwrap();
+        let (mut gx, mut gy) = (vec![0.0; 4], vec![0.0; 4]);
+        diffusivities(0, [&u, &u], [&e, &e], 1.0, [&mut gx, &mut gy]);
         assert!((gx[0] - 0.5 / EPSILON).abs() < 1e-4 && (gy[3] - 0.5 / EPSILON).abs() < 1e-4);
     }
 }

@@ -13,22 +13,25 @@
 
 use multiversion::multiversion;
 use ndarray::Array2;
-use rayon::prelude::*;
 
-use super::choice::{Explanation, Mismatch, mismatch};
+use super::choice::{Mismatch, Yardstick, mismatch};
 use super::confidence::add_coherence;
-use super::guide::{EdgeRule, edge_weights, median_guide};
-use super::phase_constraint::{TERMS, Weighting, constrain};
+use super::constraints::Constraints;
+use super::guide::{EdgeRule, edge_weights};
+use super::look::Look;
+use super::phase_constraint::{Filters, Weighting};
+use super::rows::for_each_band;
 use super::still::{Rest, look_for_rest};
 use super::visible::{keep_what_rests, see};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
-use crate::gabor::{GaborBank, Responses};
+use crate::gabor::GaborBank;
+use crate::gabor::stream::{BAND, ResponseRows};
 use crate::interpolate::{SplineDegree, SplineImage};
 
-/// Sums side by side within a line.
+/// Sums side by side: as many as a register of 512 bits holds.
 const LANES: usize = 16;
 
 /// What the refinement depends on, the same at every level.
@@ -72,23 +75,13 @@ pub(super) struct Level<'a> {
     pub(super) zoom: f32,
     pub(super) height: usize,
     pub(super) width: usize,
-    pub(super) reference: Responses<f32>,
+    reference: &'a [f32],
     pub(super) weighting: Weighting,
     pub(super) edges: [Vec<f32>; 2],
-    pub(super) guide: Vec<Array2<f32>>,
+    /// Channels of the guide.
+    pub(super) channels: &'a [Array2<f32>],
     coverage: Option<&'a Array2<f32>>,
     pub(super) others: Vec<Target<'a>>,
-}
-
-/// What a look sees, and the memory it needs; reused from look to look.
-pub(super) struct Sight {
-    /// Responses to the warped frame.
-    pub(super) responses: Responses<f32>,
-    /// Weights of its pixels, (H, W).
-    pub(super) visible: Vec<f32>,
-    /// Constraints, (H, N, 4, W), where they were asked for.
-    pub(super) constraints: Vec<f32>,
-    scratch: Vec<f32>,
 }
 
 impl<'a> Level<'a> {
@@ -97,15 +90,14 @@ impl<'a> Level<'a> {
         settings: &'a Settings,
         zoom: f32,
         reference: &'a Frame<'a>,
-        channels: &[Array2<f32>],
+        channels: &'a [Array2<f32>],
         others: &'a [Frame<'a>],
         control: &Control,
     ) -> Result<Self> {
-        let picture = reference.picture.view();
-        let (height, width) = picture.dim();
-        let responses = settings.bank.respond(picture, Border::Reflect, control)?;
-        let floor =
-            settings.amplitude_fraction * mean_power(&responses).sqrt() + settings.amplitude_floor;
+        let (height, width) = reference.picture.dim();
+        let picture = reference.picture.as_slice().unwrap_or_default();
+        let power = mean_power(&settings.bank, picture, width, control)?;
+        let floor = settings.amplitude_fraction * power.sqrt() + settings.amplitude_floor;
         let spline = |frame: &'a Frame<'a>| {
             let view = frame.picture.view();
             let image = SplineImage::new(&view, SplineDegree::Cubic, Border::Reflect, control)?;
@@ -116,37 +108,25 @@ impl<'a> Level<'a> {
             zoom,
             height,
             width,
-            reference: responses,
+            reference: picture,
             weighting: Weighting {
                 floor: (floor * floor) as f32,
                 narrowness: (settings.bank.sigma() / settings.tau).powi(2) as f32,
             },
             edges: edge_weights(channels, settings.edges, control)?,
-            guide: median_guide(channels, control)?,
+            channels,
             coverage: reference.coverage.as_ref(),
             others: others.iter().map(spline).collect::<Result<_>>()?,
         })
     }
 
-    /// Memory for looks at this level.
-    pub(super) fn sight(&self) -> Sight {
-        let filters = self.settings.bank.wavevectors().len();
-        Sight {
-            responses: Responses::zeros(filters, self.height, self.width),
-            visible: vec![0.0; self.height * self.width],
-            constraints: vec![0.0; filters * TERMS * self.height * self.width],
-            scratch: Vec::new(),
-        }
-    }
-
-    /// Warps a frame by `flow`, filters it and weighs its pixels.
-    pub(super) fn look(
+    /// Warps a frame by `flow` and weighs its pixels.
+    fn look(
         &self,
         target: &Target<'_>,
         flow: &FlowField<f32>,
-        sight: &mut Sight,
         control: &Control,
-    ) -> Result<()> {
+    ) -> Result<Look<'_>> {
         let Frame { offset, picture, ref coverage } = *target.frame;
         let scaled;
         let along = if offset == 1.0 {
@@ -157,17 +137,24 @@ impl<'a> Level<'a> {
         };
         let mut warped = target.image.warp(along.view(), control)?;
         keep_what_rests(&mut warped, picture, along, control)?;
-        see(along, coverage.as_ref(), &mut sight.visible, control)?;
+        let mut visible = vec![0.0; self.height * self.width];
+        see(along, coverage.as_ref(), &mut visible, control)?;
         if let Some(coverage) = self.coverage {
-            sight.visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
+            visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
         }
-        self.settings.bank.respond_into(
-            warped.view(),
-            Border::Reflect,
-            &mut sight.responses,
-            &mut sight.scratch,
-            control,
-        )
+        Ok(Look {
+            bank: &self.settings.bank,
+            reference: self.reference,
+            warped: warped.into_raw_vec_and_offset().0,
+            visible,
+            height: self.height,
+            width: self.width,
+        })
+    }
+
+    /// What the filters need for the frame at `offset`.
+    fn filters(&self, offset: f32) -> Filters {
+        Filters::new(&self.settings.bank, offset, self.weighting, self.height)
     }
 
     /// Looks at a frame and constrains the increment of `flow`.
@@ -175,60 +162,46 @@ impl<'a> Level<'a> {
         &self,
         target: &Target<'_>,
         flow: &FlowField<f32>,
-        sight: &mut Sight,
+        constraints: &mut Constraints,
         control: &Control,
     ) -> Result<()> {
-        self.look(target, flow, sight, control)?;
-        let (bank, offset) = (&self.settings.bank, target.frame.offset);
-        let Sight { responses, visible, constraints, .. } = sight;
-        let pair = [&self.reference, &*responses];
-        constrain(bank, pair, visible, offset, self.weighting, constraints, control)
+        let look = self.look(target, flow, control)?;
+        constraints.fill(&look, &self.filters(target.frame.offset), control)
     }
 
     /// What rests between the reference and the next frame; see [`super::still`].
-    pub(super) fn look_for_rest(
-        &self,
-        sight: &mut Sight,
-        control: &Control,
-    ) -> Result<Option<Rest>> {
+    pub(super) fn look_for_rest(&self, control: &Control) -> Result<Option<Rest>> {
         let next = self.others.iter().find(|target| target.frame.offset == 1.0);
         let Some(target) = next.filter(|_| self.settings.still) else { return Ok(None) };
-        let zero = Array2::zeros((self.height, self.width));
-        self.constrain(target, &FlowField { u: zero.clone(), v: zero }, sight, control)?;
-        let pair = [&self.reference, &sight.responses];
+        let zero = || Array2::zeros((self.height, self.width));
+        let look = self.look(target, &FlowField { u: zero(), v: zero() }, control)?;
         let (floor, k0) = (self.weighting.floor, wavenumber(&self.settings.bank));
-        look_for_rest(pair, &sight.constraints, floor, k0, self.zoom, control).map(Some)
+        look_for_rest(&look, &self.filters(1.0), floor, k0, self.zoom, control).map(Some)
     }
 
     /// How badly `flow` explains the only other frame; see [`super::choice`].
     pub(super) fn mismatch(&self, flow: &FlowField<f32>, control: &Control) -> Result<Mismatch> {
-        let mut sight = self.sight();
-        self.constrain(&self.others[0], flow, &mut sight, control)?;
-        let seen = Explanation {
-            responses: [&self.reference, &sight.responses],
-            visible: &sight.visible,
-            constraints: &sight.constraints,
+        let target = &self.others[0];
+        let look = self.look(target, flow, control)?;
+        let yardstick = Yardstick {
             floor: self.weighting.floor,
             scale: self.scale(),
             residual: self.settings.residual,
         };
-        mismatch(&seen, control)
+        mismatch(&look, &self.filters(target.frame.offset), yardstick, control)
     }
 
     /// Mean coherence of the frames at `flow`; see [`super::confidence`].
     pub(super) fn coherence(
         &self,
         flow: &FlowField<f32>,
-        sight: &mut Sight,
         control: &Control,
     ) -> Result<Array2<f32>> {
         let mut sum = Array2::zeros(flow.dim());
         let share = 1.0 / self.others.len() as f32;
         for target in &self.others {
-            self.look(target, flow, sight, control)?;
-            let floor = self.weighting.floor;
-            let pair = [&self.reference, &sight.responses];
-            add_coherence(pair, &sight.visible, floor, share, &mut sum, control)?;
+            let look = self.look(target, flow, control)?;
+            add_coherence(&look, self.weighting.floor, share, &mut sum, control)?;
         }
         Ok(sum)
     }
@@ -247,32 +220,36 @@ fn wavenumber(bank: &GaborBank<f32>) -> f64 {
 }
 
 /// Mean of the squared amplitude over pixels and filters.
-fn mean_power(responses: &Responses<f32>) -> f64 {
-    let (filters, height, width) = responses.dim();
-    let row = |y: usize| -> f64 {
-        let of_filter = |j: usize| {
-            let (re, im) = responses.row(j, y);
-            f64::from(power(re, im))
-        };
-        (0..filters).map(of_filter).sum()
-    };
-    let mut rows = vec![0.0; height];
-    rows.par_iter_mut().with_min_len(64).enumerate().for_each(|(y, sum)| *sum = row(y));
-    rows.iter().sum::<f64>() / (filters * height * width) as f64
+fn mean_power(
+    bank: &GaborBank<f32>,
+    picture: &[f32],
+    width: usize,
+    control: &Control,
+) -> Result<f64> {
+    let row = 2 * bank.wavevectors().len() * width;
+    let mut sums = vec![0.0f32; picture.len() / width];
+    for_each_band([&mut sums], [1], BAND, control, |first, [sums]| {
+        let mut rows = ResponseRows::new(bank, picture, width, Border::Reflect, first);
+        let mut responses = vec![0.0; row];
+        for (i, sum) in sums.iter_mut().enumerate() {
+            control.check()?;
+            rows.respond(first + i, &mut responses);
+            *sum = sum_of_squares(&responses);
+        }
+        Ok(())
+    })?;
+    let total: f64 = sums.iter().map(|&sum| f64::from(sum)).sum();
+    Ok(2.0 * total / (row * sums.len()) as f64)
 }
 
-/// Sum of squares of two lines, in lanes.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn power(re: &[f32], im: &[f32]) -> f32 {
-    let mut sums = [0.0; LANES];
-    for line in [re, im] {
-        let (blocks, rest) = line.as_chunks::<LANES>();
-        for block in blocks {
-            for lane in 0..LANES {
-                sums[lane] += block[lane] * block[lane];
-            }
+fn sum_of_squares(samples: &[f32]) -> f32 {
+    let (blocks, rest) = samples.as_chunks::<LANES>();
+    let mut sums = [0.0f32; LANES];
+    for block in blocks {
+        for lane in 0..LANES {
+            sums[lane] += block[lane] * block[lane];
         }
-        rest.iter().zip(&mut sums).for_each(|(s, sum)| *sum += s * s);
     }
-    sums.iter().sum()
+    sums.iter().sum::<f32>() + rest.iter().map(|s| s * s).sum::<f32>()
 }

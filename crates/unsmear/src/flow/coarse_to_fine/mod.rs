@@ -26,6 +26,7 @@ mod arctangent;
 mod boundary;
 mod choice;
 mod confidence;
+mod constraints;
 mod contrast;
 mod data_term;
 mod diffusivity;
@@ -36,6 +37,7 @@ mod guide;
 mod known;
 mod level;
 mod lighting;
+mod look;
 mod noise_rule;
 mod parameters;
 mod phase_constraint;
@@ -43,9 +45,11 @@ mod precision;
 mod recorded;
 mod refine;
 mod relight;
+mod response_pair;
 mod round_trip;
 mod rows;
 mod schedule;
+mod slope;
 mod still;
 mod visible;
 
@@ -117,7 +121,7 @@ impl CoarseToFine {
         let finest = self.finest_level.min(sizes.len() - 1);
         let others = self.offsets(sequence.index, sequence.frames.dim().0).len();
         let climbs = 1 + usize::from(self.choose_frames && others > 1);
-        climbs * (finest..sizes.len()).map(|level| self.warps_at(level)).sum::<usize>()
+        climbs * (finest..sizes.len()).map(|level| self.warps_at(level, finest)).sum::<usize>()
     }
 
     /// The flow of the frames in the order given; `colour` lets edges of single channels break it.
@@ -145,12 +149,14 @@ impl CoarseToFine {
             let picture = reference.pictures[0].as_slice().unwrap_or_default();
             adapt(&mut settings, picture, (height, width), control)?;
         }
-        let warps: Vec<usize> = (0..sizes.len()).map(|level| self.warps_at(level)).collect();
+        let finest = self.finest_level.min(sizes.len() - 1);
+        let warps: Vec<usize> =
+            (0..sizes.len()).map(|level| self.warps_at(level, finest)).collect();
         let climb = Climb {
             settings: &settings,
             sizes: &sizes,
             warps: &warps,
-            finest: self.finest_level.min(sizes.len() - 1),
+            finest,
             reference: &reference,
             channels: &channels,
         };
@@ -175,8 +181,9 @@ impl CoarseToFine {
             .collect()
     }
 
-    fn warps_at(&self, level: usize) -> usize {
-        if level == 0 { self.finest_warps } else { self.warps }
+    /// Warps at a level of which `finest` is the last that is solved.
+    fn warps_at(&self, level: usize, finest: usize) -> usize {
+        if level == finest { self.finest_warps } else { self.warps }
     }
 
     fn settings(&self) -> Result<Settings> {

@@ -21,10 +21,9 @@
 use multiversion::multiversion;
 
 use super::arctangent::arctangent;
-use crate::array::for_each_row;
-use crate::control::Control;
-use crate::error::Result;
-use crate::gabor::{GaborBank, Responses};
+use super::response_pair::{Band, ResponsePair};
+use super::slope::{Cross, Stencil, deviation, place};
+use crate::gabor::GaborBank;
 
 /// Terms of a constraint, one row each: `G_x`, `G_y`, `D`, `W`.
 pub(super) const TERMS: usize = 4;
@@ -44,26 +43,6 @@ pub(super) struct Weighting {
     pub(super) narrowness: f32,
 }
 
-/// Complex factors of the samples before and after in a derivative along one axis.
-#[derive(Clone, Copy)]
-struct Stencil {
-    before: [f32; 2],
-    after: [f32; 2],
-}
-
-impl Stencil {
-    /// At position `i` of `n` samples; a neighbour beyond the edge is the sample itself.
-    fn new(k: f64, i: usize, n: usize) -> Self {
-        let (first, last) = (i == 0, i + 1 == n);
-        let scale = if first || last { 1.0 } else { 0.5 };
-        let turn = |angle: f64, by: f64| [by * angle.cos(), by * angle.sin()].map(|f| f as f32);
-        Self {
-            before: turn(if first { 0.0 } else { k }, -scale),
-            after: turn(if last { 0.0 } else { -k }, scale),
-        }
-    }
-}
-
 /// The constants of one filter on one row.
 #[derive(Clone, Copy)]
 struct Filter {
@@ -74,47 +53,62 @@ struct Filter {
     weighting: Weighting,
 }
 
-/// Rows of one filter's response: above, here and below, real and imaginary.
-type Band<'a> = [(&'a [f32], &'a [f32]); 3];
-
-/// Fills `out` with rows `[G_x, G_y, D, W]` of each filter, (H, N, 4, W).
-///
-/// `visible` (H, W) is `w`, `offset` is `k`.
-///
-/// # Errors
-/// [`Error::Cancelled`](crate::Error::Cancelled).
-pub(super) fn constrain(
-    bank: &GaborBank<f32>,
-    responses: [&Responses<f32>; 2],
-    visible: &[f32],
+/// What all filters of a bank need to constrain the motion to the frame at `offset`.
+pub(super) struct Filters {
+    /// Wavevector, and the stencils along x and y.
+    tuned: Vec<([f32; 2], [[Stencil; 4]; 2])>,
     offset: f32,
     weighting: Weighting,
-    out: &mut [f32],
-    control: &Control,
-) -> Result<()> {
-    let (filters, height, width) = responses[0].dim();
-    for_each_row(out, filters * TERMS * width, control, |y, out| {
-        let seen = &visible[y * width..(y + 1) * width];
+    height: usize,
+}
+
+impl Filters {
+    /// For pictures of `height` rows; `offset` is `k`.
+    pub(super) fn new(
+        bank: &GaborBank<f32>,
+        offset: f32,
+        weighting: Weighting,
+        height: usize,
+    ) -> Self {
+        let tuned = bank.wavevectors().iter().map(|k| (k.map(|k| k as f32), k.map(Stencil::all)));
+        Self { tuned: tuned.collect(), offset, weighting, height }
+    }
+
+    /// Bound of `|G_x|` and `|G_y|`, rad/px: the tuned frequency and the farthest from it that is kept.
+    pub(super) fn largest_slope(&self) -> f32 {
+        let tuned = self.tuned.iter().map(|([kx, ky], _)| kx.hypot(*ky)).fold(0.0, f32::max);
+        self.offset.abs() * (tuned + (FARTHEST / self.weighting.narrowness).sqrt())
+    }
+
+    /// Fills `out` with the rows `[G_x, G_y, D, W]` of each filter at row `y`, (N, 4, W).
+    ///
+    /// `seen` is `w`.
+    pub(super) fn constrain(
+        &self,
+        y: usize,
+        pair: &ResponsePair<'_>,
+        seen: &[f32],
+        out: &mut [f32],
+    ) {
+        let width = seen.len();
         for (j, out) in out.chunks_mut(TERMS * width).enumerate() {
-            let [kx, ky] = bank.wavevectors()[j];
-            let bands = responses.map(|r| {
-                [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|row| r.row(j, row))
-            });
+            let (tuned, [along_x, along_y]) = self.tuned[j];
+            let bands = pair.bands(j);
             let mut filter = Filter {
-                tuned: [kx as f32, ky as f32],
-                along_x: Stencil::new(kx, 1, 3),
-                along_y: Stencil::new(ky, y, height),
-                offset,
-                weighting,
+                tuned,
+                along_x: along_x[0],
+                along_y: along_y[place(y, self.height)],
+                offset: self.offset,
+                weighting: self.weighting,
             };
             let (slopes, rest) = out.split_at_mut(2 * width);
             let (gx, gy) = slopes.split_at_mut(width);
             let (step, weight) = rest.split_at_mut(width);
             if width > 2 {
-                constrain_row(filter, bands[0], bands[1], seen, gx, gy, step, weight);
+                inner_pixels(filter, bands[0], bands[1], seen, gx, gy, step, weight);
             }
             for x in [0, width - 1] {
-                filter.along_x = Stencil::new(kx, x, width);
+                filter.along_x = along_x[place(x, width)];
                 let at = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
                 let [one, other] = bands.map(|band| Cross::new(&band, at));
                 let terms = constraint(&filter, &one, &other);
@@ -122,12 +116,12 @@ pub(super) fn constrain(
                 weight[x] = terms[3] * seen[x];
             }
         }
-    })
+    }
 }
 
 /// All samples of a row but the first and the last.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn constrain_row(
+fn inner_pixels(
     filter: Filter,
     one: Band<'_>,
     other: Band<'_>,
@@ -148,35 +142,6 @@ fn constrain_row(
         step[x] = terms[2];
         weight[x] = terms[3] * seen[x];
     }
-}
-
-/// A response and its four neighbours.
-#[derive(Clone, Copy)]
-struct Cross {
-    here: [f32; 2],
-    across: [[f32; 2]; 2],
-    along: [[f32; 2]; 2],
-}
-
-impl Cross {
-    #[inline(always)]
-    fn new([above, here, below]: &Band<'_>, [left, x, right]: [usize; 3]) -> Self {
-        Self {
-            here: [here.0[x], here.1[x]],
-            across: [[here.0[left], here.1[left]], [here.0[right], here.1[right]]],
-            along: [[above.0[x], above.1[x]], [below.0[x], below.1[x]]],
-        }
-    }
-}
-
-/// Deviation of the phase gradient along one axis from the tuned one, rad/px.
-#[inline(always)]
-fn deviation([re, im]: [f32; 2], [a, b]: [[f32; 2]; 2], s: Stencil, inverse: f32) -> f32 {
-    let slope_re =
-        s.before[0] * a[0] - s.before[1] * a[1] + (s.after[0] * b[0] - s.after[1] * b[1]);
-    let slope_im =
-        s.before[0] * a[1] + s.before[1] * a[0] + (s.after[0] * b[1] + s.after[1] * b[0]);
-    (re * slope_im - im * slope_re) * inverse
 }
 
 /// `[G_x, G_y, D, W]` of one pixel, for a frame that is seen there.
@@ -228,45 +193,61 @@ mod tests {
         .unwrap()
     }
 
-    /// Each filter's own wave, ahead by `phase`.
+    /// Each filter's own wave, ahead by `phase`, rows (N, 2, W).
     fn waves(
         bank: &GaborBank<f32>,
         (height, width): (usize, usize),
         amplitude: f64,
         phase: f64,
-    ) -> Responses<f32> {
-        let mut responses = Responses::zeros(4, height, width);
-        for (j, &[kx, ky]) in bank.wavevectors().iter().enumerate() {
-            for y in 0..height {
-                let (re, im) = responses.row_mut(j, y);
-                for x in 0..width {
-                    let angle = kx * x as f64 + ky * y as f64 + phase;
-                    re[x] = (amplitude * angle.cos()) as f32;
-                    im[x] = (amplitude * angle.sin()) as f32;
-                }
+    ) -> Vec<Vec<f32>> {
+        let row = |y: usize| {
+            let mut row = Vec::new();
+            for &[kx, ky] in bank.wavevectors() {
+                let angle = |x: usize| kx * x as f64 + ky * y as f64 + phase;
+                row.extend((0..width).map(|x| (amplitude * angle(x).cos()) as f32));
+                row.extend((0..width).map(|x| (amplitude * angle(x).sin()) as f32));
             }
+            row
+        };
+        (0..height).map(row).collect()
+    }
+
+    /// Terms of all rows.
+    fn constrain(
+        bank: &GaborBank<f32>,
+        pair: [&Vec<Vec<f32>>; 2],
+        seen: f32,
+        offset: f32,
+        floor: f32,
+    ) -> Vec<f32> {
+        let (height, width) = (pair[0].len(), pair[0][0].len() / 8);
+        let filters = Filters::new(bank, offset, Weighting { floor, narrowness: 1.0 }, height);
+        let mut out = vec![f32::NAN; height * 4 * TERMS * width];
+        for (y, out) in out.chunks_mut(4 * TERMS * width).enumerate() {
+            let near = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+            let rows = pair.map(|frame| near.map(|y| &frame[y][..]));
+            filters.constrain(y, &ResponsePair::new(rows, width), &vec![seen; width], out);
         }
-        responses
+        let bound = filters.largest_slope();
+        let slopes = |row: &[f32]| row[..2 * width].iter().all(|g| g.abs() <= bound);
+        assert!(out.chunks(TERMS * width).all(slopes));
+        out
     }
 
     /// `G = k_j`, `D` the phase and `W = w A/(A + r^2) q^2`, at the edges too; without a neighbour along an axis the
     /// derivative reads the tuned frequency, which here is the truth.
     #[test]
     fn terms_of_plane_waves_are_exact_up_to_the_edge() {
-        let (bank, control) = (bank(), Control::new());
+        let bank = bank();
         for shape in [(5, 7), (4, 40), (1, 9), (9, 1), (1, 1), (2, 2)] {
             let pair = [waves(&bank, shape, 3.0, 0.2), waves(&bank, shape, 6.0, 0.9)];
-            let (height, width) = shape;
-            let mut out = vec![f32::NAN; height * width * 4 * TERMS];
-            let seen = vec![0.5; height * width];
-            let rule = Weighting { floor: 4.5, narrowness: 1.0 };
-            constrain(&bank, [&pair[0], &pair[1]], &seen, 2.0, rule, &mut out, &control).unwrap();
+            let out = constrain(&bank, [&pair[0], &pair[1]], 0.5, 2.0, 4.5);
             // A = 18, q = 36/45.
             let weight = 0.5 * 18.0 / (18.0 + 4.5) * 0.64;
-            for (row, terms) in out.chunks(TERMS * width).enumerate() {
+            for (row, terms) in out.chunks(TERMS * shape.1).enumerate() {
                 let [kx, ky] = bank.wavevectors()[row % 4];
-                for x in 0..width {
-                    let at = |term: usize| f64::from(terms[term * width + x]);
+                for x in 0..shape.1 {
+                    let at = |term: usize| f64::from(terms[term * shape.1 + x]);
                     assert!((at(0) - 2.0 * kx).abs() < 1e-5 && (at(1) - 2.0 * ky).abs() < 1e-5);
                     assert!((at(2) - 0.7).abs() < 1e-5 && (at(3) - weight).abs() < 1e-5);
                 }
@@ -276,16 +257,28 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_has_no_say() {
-        let (bank, control) = (bank(), Control::new());
+        let bank = bank();
         let (good, mut bad) = (waves(&bank, (6, 6), 1.0, 0.0), waves(&bank, (6, 6), 1.0, 0.0));
-        bad.row_mut(1, 3).0[2] = f32::NAN;
-        let mut out = vec![0.0; 36 * 4 * TERMS];
-        let rule = Weighting { floor: 1.0, narrowness: 1.0 };
-        constrain(&bank, [&good, &bad], &[1.0; 36], 1.0, rule, &mut out, &control).unwrap();
+        bad[3][2 * 6 + 2] = f32::NAN;
+        let out = constrain(&bank, [&good, &bad], 1.0, 1.0, 1.0);
         assert!(out.iter().all(|term| term.is_finite()));
         assert_eq!(out[((3 * 4 + 1) * TERMS + 3) * 6 + 2], 0.0);
-        let silent = Responses::zeros(4, 6, 6);
-        constrain(&bank, [&good, &silent], &[1.0; 36], 1.0, rule, &mut out, &control).unwrap();
+        let silent = vec![vec![0.0; 8 * 6]; 6];
+        let out = constrain(&bank, [&good, &silent], 1.0, 1.0, 1.0);
         assert!(out.iter().all(|&term| term == 0.0));
+    }
+
+    /// A frequency far off the tuned one is dropped before its slope leaves the bound.
+    #[test]
+    fn slopes_stay_within_their_bound() {
+        let bank = bank();
+        let mut noise = waves(&bank, (9, 50), 1.0, 0.0);
+        let mut state = 7u32;
+        for sample in noise.iter_mut().flatten() {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *sample = (state >> 8) as f32 / 8_388_608.0 - 1.0;
+        }
+        let out = constrain(&bank, [&noise, &noise], 1.0, -3.0, 1.0);
+        assert!(out.iter().any(|term| term.abs() > 4.0));
     }
 }

@@ -23,7 +23,7 @@
 use multiversion::multiversion;
 use ndarray::ArrayView2;
 
-use super::phase_constraint::TERMS;
+use super::constraints::{Constraints, Units};
 use super::rows::for_each_rows;
 use crate::control::Control;
 use crate::error::Result;
@@ -40,14 +40,14 @@ const NO_TRACE: f32 = 1e-6;
 /// Deviation of the averages, px.
 const SIGMA: f64 = 2.0;
 
-/// Fills `out` (H, W) with `g` from the constraints (H, N, 4, W) of each frame.
+/// Fills `out` (H, W) with `g` from the constraints of each frame.
 ///
 /// `precision` is `s_0` in rad, `scale` is `s`.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn precision(
-    frames: &[&[f32]],
+    frames: &[&Constraints],
     width: usize,
     precision: f32,
     scale: f32,
@@ -56,17 +56,14 @@ pub(super) fn precision(
 ) -> Result<()> {
     let samples = out.len();
     let (mut residual, mut trace) = (vec![0.0; samples], vec![0.0; samples]);
-    let per_row = frames[0].len() / (samples / width);
     let sums = [&mut residual[..], &mut *out, &mut trace[..]];
     for_each_rows(sums, [width; 3], control, |y, [residual, weight, trace]| {
         residual.fill(0.0);
         weight.fill(0.0);
         trace.fill(0.0);
         for constraints in frames {
-            let filters = &constraints[y * per_row..(y + 1) * per_row];
-            for terms in filters.chunks_exact(TERMS * width) {
-                add(terms, residual, weight, trace);
-            }
+            let (filters, units) = constraints.row(y);
+            filters.for_each(|terms| add(terms, units, residual, weight, trace));
         }
     })?;
     let averaged = |plane: &[f32]| {
@@ -76,7 +73,9 @@ pub(super) fn precision(
             |view| smooth(view, SIGMA, control).map(|plane| plane.into_raw_vec_and_offset().0),
         )
     };
-    let (residual, trace) = (averaged(&residual)?, averaged(&trace)?);
+    // One after the other: each average takes the place of its plane.
+    residual = averaged(&residual)?;
+    trace = averaged(&trace)?;
     let weight = averaged(out)?;
     for_each_rows([out], [width], control, |y, [out]| {
         let row = y * width..(y + 1) * width;
@@ -87,15 +86,18 @@ pub(super) fn precision(
 
 /// Adds one filter's `W D^2`, `W` and `W |G|^2` on a row.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add(terms: &[f32], residual: &mut [f32], weight: &mut [f32], trace: &mut [f32]) {
+fn add(terms: &[i16], units: Units, residual: &mut [f32], weight: &mut [f32], trace: &mut [f32]) {
     let n = residual.len();
     let (weight, trace) = (&mut weight[..n], &mut trace[..n]);
-    let (gx, gy) = (&terms[..n], &terms[n..2 * n]);
-    let (step, w) = (&terms[2 * n..3 * n], &terms[3 * n..4 * n]);
+    let (slope_x, slope_y) = (&terms[..n], &terms[n..2 * n]);
+    let (steps, roots) = (&terms[2 * n..3 * n], &terms[3 * n..4 * n]);
     for x in 0..n {
-        residual[x] += w[x] * step[x] * step[x];
-        weight[x] += w[x];
-        trace[x] += w[x] * (gx[x] * gx[x] + gy[x] * gy[x]);
+        let (gx, gy) = (f32::from(slope_x[x]) * units.slope, f32::from(slope_y[x]) * units.slope);
+        let (step, root) = (f32::from(steps[x]) * units.step, f32::from(roots[x]) * units.root);
+        let w = root * root;
+        residual[x] += w * step * step;
+        weight[x] += w;
+        trace[x] += w * (gx * gx + gy * gy);
     }
 }
 
@@ -129,7 +131,7 @@ mod tests {
     fn g(terms: [f32; 4]) -> f32 {
         let (width, height) = (24, 20);
         let row = terms.into_iter().flat_map(|term| [term; 24]).collect::<Vec<_>>();
-        let constraints = row.repeat(height);
+        let constraints = Constraints::of(&row.repeat(height), 1, width, 1.6);
         let mut out = vec![0.0; width * height];
         precision(&[&constraints], width, 0.25, 0.4, &mut out, &Control::new()).unwrap();
         assert!(out.iter().all(|g| (1.0..=100.0).contains(g)));

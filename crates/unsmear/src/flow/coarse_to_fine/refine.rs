@@ -22,16 +22,18 @@ use multiversion::multiversion;
 use ndarray::Array2;
 
 use super::boundary::boundaries;
-use super::data_term::{NormalEquations, Reweighting, accumulate};
+use super::constraints::Constraints;
+use super::data_term::{DataTerm, Reweighting};
 use super::diffusivity::diffusivities;
-use super::level::{Level, Settings, Sight};
+use super::guide::median_guide;
+use super::level::{Level, Settings};
 use super::precision::precision;
-use super::rows::for_each_rows;
+use super::rows::{Planes, for_each_band, for_each_rows, row_of};
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::median::median_5x5;
-use crate::sor::{SorScratch, SorSystem, solve};
+use crate::sor::{SorScratch, SystemRows, solve_rows};
 use crate::weighted_median::{WeightedMedian, weighted_median};
 
 /// Largest change of a flow component by one warp, px: below half the wavelength of 4 px.
@@ -42,114 +44,157 @@ const RELAXATION: f32 = 1.9;
 const BOUNDARY: f32 = 0.1;
 /// Spatial deviation of the weighted median, in radii.
 const MEDIAN_SPREAD: f32 = 0.8;
-
-/// Sums side by side within a row.
+/// Rows of a band where each has memory of its own.
+const BAND: usize = 32;
+/// Samples handled together: a register of 512 bits.
 const LANES: usize = 16;
 
-/// What a level adds: the flow, and the data terms of its last warp.
+/// What a level adds: the flow, and the data terms of its last warp at the solution of the equations.
 pub(super) struct Refined {
     pub(super) flow: FlowField<f32>,
-    /// The data terms, raised by precision.
-    pub(super) equations: NormalEquations,
+    /// `a11, a12, a22` of the data terms, raised by precision, (H, W) each.
+    pub(super) matrix: [Vec<f32>; 3],
     /// Their trace before it was raised, without the pull to rest.
     pub(super) trace: Array2<f32>,
     /// Mean change of the flow by each warp, px of the level.
     pub(super) changes: Vec<f64>,
 }
 
+/// Data and smoothness, linear around a flow, row by row.
+struct Linearised<'a> {
+    data: &'a DataTerm<'a>,
+    edges: Planes<'a>,
+    alpha: f32,
+}
+
+impl SystemRows for Linearised<'_> {
+    fn data(&self, y: usize, flow: Planes<'_>, out: [&mut [f32]; 5]) {
+        self.data.equations(y, flow, out);
+    }
+
+    fn diffusivities(&self, y: usize, flow: Planes<'_>, out: [&mut [f32]; 2]) {
+        diffusivities(y, flow, self.edges, self.alpha, out);
+    }
+}
+
+/// The largest pieces of memory of a refinement, kept from level to level: the finest needs them in full, and what the
+/// coarser ones take is part of that.
+pub(super) struct Workspace {
+    /// Of each other frame.
+    constraints: Vec<Constraints>,
+    sor: SorScratch,
+    /// Whether no level follows: then each piece is given back as soon as it has served.
+    pub(super) finest: bool,
+}
+
+impl Workspace {
+    /// For a number of other frames, by a number of filters, of up to `size` (H, W).
+    pub(super) fn new(frames: usize, filters: usize, size: (usize, usize)) -> Self {
+        let constraints = || Constraints::with_room(filters, size.0 * size.1);
+        Self {
+            constraints: (0..frames).map(|_| constraints()).collect(),
+            sor: SorScratch::with_room(size.0, size.1),
+            finest: false,
+        }
+    }
+}
+
+/// What acts on the data of one level besides the constraints.
+struct Weights {
+    /// Pull towards rest; see [`super::still`].
+    springs: Vec<f32>,
+    /// Factor of the data; see [`super::precision`].
+    gain: Vec<f32>,
+}
+
 impl Level<'_> {
     /// The flow after `warps` warps from `flow`, pulled towards rest by `springs`.
-    ///
-    /// `sights` are memory, one for each other frame.
     pub(super) fn refine(
         &self,
         mut flow: FlowField<f32>,
         warps: usize,
         springs: Option<Array2<f32>>,
-        sights: &mut [Sight],
+        workspace: &mut Workspace,
         control: &Control,
     ) -> Result<Refined> {
-        let mut work = Work::new(self);
-        if let Some(springs) = springs {
-            work.springs = springs.into_raw_vec_and_offset().0;
-        }
+        let samples = self.height * self.width;
+        let mut weights = Weights {
+            springs: springs.map_or_else(|| vec![0.0; samples], |s| s.into_raw_vec_and_offset().0),
+            gain: vec![1.0; samples],
+        };
         let mut changes = Vec::with_capacity(warps);
-        for _ in 0..warps {
-            for (target, sight) in self.others.iter().zip(&mut *sights) {
-                self.constrain(target, &flow, sight, control)?;
+        let mut matrix = [(); 3].map(|()| Vec::new());
+        for warp in 0..warps {
+            for (target, constraints) in self.others.iter().zip(&mut workspace.constraints) {
+                self.constrain(target, &flow, constraints, control)?;
             }
-            changes.push(self.minimise(&mut flow, sights, &mut work, control)?);
+            let last = (warp + 1 == warps).then_some(&mut matrix);
+            changes.push(self.minimise(&mut flow, workspace, &mut weights, last, control)?);
             control.advance()?;
         }
-        let Work { equations, springs, gain, .. } = work;
+        if workspace.finest {
+            workspace.constraints.clear();
+        }
+        let [a11, _, a22] = &matrix;
         let mut trace = Array2::zeros((self.height, self.width));
         let plane = trace.as_slice_mut().unwrap_or_default();
         for_each_rows([plane], [self.width], control, |y, [trace]| {
-            let row = y * self.width..(y + 1) * self.width;
-            let [a11, a22, gain, springs] =
-                [&equations.a11, &equations.a22, &gain, &springs].map(|p| &p[row.clone()]);
             for (x, trace) in trace.iter_mut().enumerate() {
-                *trace = (a11[x] + a22[x]) / gain[x] - 2.0 * springs[x];
+                let i = y * self.width + x;
+                *trace = (a11[i] + a22[i]) / weights.gain[i] - 2.0 * weights.springs[i];
             }
         })?;
-        Ok(Refined { flow: self.sharpen(flow, control)?, equations, trace, changes })
+        drop(weights);
+        Ok(Refined { flow: self.sharpen(flow, control)?, matrix, trace, changes })
     }
 
     /// Moves `flow` to the minimum of the energy within reach of one warp; returns the mean change, px.
+    ///
+    /// Where `matrix` is wanted it becomes that of the data terms.
     fn minimise(
         &self,
         flow: &mut FlowField<f32>,
-        sights: &[Sight],
-        work: &mut Work,
+        workspace: &mut Workspace,
+        weights: &mut Weights,
+        matrix: Option<&mut [Vec<f32>; 3]>,
         control: &Control,
     ) -> Result<f64> {
         let Settings { residual, alpha, passes, sweeps, .. } = *self.settings;
-        let scale = self.scale();
+        let (scale, width) = (self.scale(), self.width);
         let [start_u, start_v] =
             [&mut flow.u, &mut flow.v].map(|c| c.as_slice_mut().unwrap_or_default());
-        let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
-        let constraints: Vec<&[f32]> = sights.iter().map(|sight| &sight.constraints[..]).collect();
-        let edges = [&self.edges[0][..], &self.edges[1][..]];
+        let Workspace { constraints, sor, finest } = workspace;
+        let Weights { springs, gain } = weights;
+        let frames: Vec<&Constraints> = constraints.iter().collect();
         if self.settings.precision > 0.0 {
-            let gain = &mut work.gain;
-            precision(&constraints, self.width, self.settings.precision, scale, gain, control)?;
+            precision(&frames, width, self.settings.precision, scale, gain, control)?;
         }
+        let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
+        let data = DataTerm {
+            frames,
+            warped_with: [start_u, start_v],
+            reweighting: Reweighting { residual, scale },
+            springs,
+            gain,
+            width,
+        };
+        let edges = [&self.edges[0][..], &self.edges[1][..]];
+        let (system, size) = (Linearised { data: &data, edges, alpha }, [self.height, width]);
         for _ in 0..passes {
-            accumulate(
-                &constraints,
-                [&u, &v],
-                [start_u, start_v],
-                self.width,
-                Reweighting { residual, scale },
-                &mut work.equations,
-                control,
-            )?;
-            weigh(work, self.width, control)?;
-            let between = [&mut work.gx[..], &mut work.gy[..]];
-            diffusivities([&u, &v], edges, alpha, between, self.width, control)?;
-            let system = SorSystem {
-                a11: &work.equations.a11,
-                a12: &work.equations.a12,
-                a22: &work.equations.a22,
-                c1: &work.equations.c1,
-                c2: &work.equations.c2,
-                gx: &work.gx,
-                gy: &work.gy,
-                height: self.height,
-                width: self.width,
-            };
-            solve(&system, &mut u, &mut v, RELAXATION, sweeps, &mut work.sor, control)?;
+            solve_rows(&system, size, &mut u, &mut v, RELAXATION, sweeps, sor, control)?;
         }
-        let mut sums = vec![0.0; self.height];
-        let planes = [&mut u[..], &mut v[..], &mut sums[..]];
-        for_each_rows(planes, [self.width, self.width, 1], control, |y, [u, v, sum]| {
-            let row = y * self.width..(y + 1) * self.width;
-            sum[0] = limit(u, &start_u[row.clone()]) + limit(v, &start_v[row]);
-        })?;
-        median_5x5(&u, self.height, self.width, start_u, control)?;
-        median_5x5(&v, self.height, self.width, start_v, control)?;
-        let change: f64 = sums.iter().map(|&sum| f64::from(sum)).sum();
-        Ok(change / (self.height * self.width) as f64)
+        if let Some(matrix) = matrix {
+            if *finest {
+                *sor = SorScratch::default();
+            }
+            *matrix = matrix_of(&data, [&u, &v], control)?;
+        }
+        let mut change = 0.0;
+        for (component, start) in [(&mut u, start_u), (&mut v, start_v)] {
+            change += clip(component, start, width, control)?;
+            median_5x5(component, self.height, width, start, control)?;
+        }
+        Ok(change / (self.height * width) as f64)
     }
 
     /// The weighted median at motion boundaries.
@@ -165,8 +210,8 @@ impl Level<'_> {
         };
         let [u, v] = [&flow.u, &flow.v].map(|c| c.as_slice().unwrap_or_default());
         let mask = boundaries([u, v], self.width, BOUNDARY, control)?;
-        let guide: Vec<&[f32]> =
-            self.guide.iter().map(|c| c.as_slice().unwrap_or_default()).collect();
+        let guide = median_guide(self.channels, control)?;
+        let guide: Vec<&[f32]> = guide.iter().map(|c| c.as_slice().unwrap_or_default()).collect();
         let mut out = FlowField { u: flow.u.clone(), v: flow.v.clone() };
         let (out_u, out_v) = (&mut out.u, &mut out.v);
         weighted_median(
@@ -185,60 +230,55 @@ impl Level<'_> {
     }
 }
 
-/// Memory of the refinement of one level.
-struct Work {
-    equations: NormalEquations,
-    /// Pull towards rest, added to the diagonal; see [`super::still`].
-    springs: Vec<f32>,
-    /// Factor of the data; see [`super::precision`].
-    gain: Vec<f32>,
-    gx: Vec<f32>,
-    gy: Vec<f32>,
-    sor: SorScratch,
-}
-
-impl Work {
-    fn new(level: &Level<'_>) -> Self {
-        let samples = level.height * level.width;
-        Self {
-            equations: NormalEquations::zeros(samples),
-            springs: vec![0.0; samples],
-            gain: vec![1.0; samples],
-            gx: vec![0.0; samples],
-            gy: vec![0.0; samples],
-            sor: SorScratch::default(),
+/// `a11, a12, a22` of the data terms at `flow`.
+fn matrix_of(data: &DataTerm<'_>, flow: Planes<'_>, control: &Control) -> Result<[Vec<f32>; 3]> {
+    let width = data.width;
+    let mut matrix = [(); 3].map(|()| vec![0.0; flow[0].len()]);
+    let planes = matrix.each_mut().map(|plane| &mut plane[..]);
+    for_each_band(planes, [width; 3], BAND, control, |first, mut band| {
+        let (mut c1, mut c2) = (vec![0.0; width], vec![0.0; width]);
+        for i in 0..band[0].len() / width {
+            control.check()?;
+            let [a11, a12, a22] = row_of(&mut band, [width; 3], i);
+            data.equations(first + i, flow, [a11, a12, a22, &mut c1, &mut c2]);
         }
-    }
+        Ok(())
+    })?;
+    Ok(matrix)
 }
 
-/// Limits the increments of a row from `old` to `new`; returns the sum of their sizes, px.
+/// Clips the change from `start` to [`LARGEST_INCREMENT`]; returns the sum of its size.
+fn clip(component: &mut [f32], start: &[f32], width: usize, control: &Control) -> Result<f64> {
+    let mut sums = vec![0.0f32; component.len() / width];
+    for_each_rows([component, &mut sums], [width, 1], control, |y, [row, sum]| {
+        sum[0] = clip_row(row, &start[y * width..(y + 1) * width]);
+    })?;
+    Ok(sums.iter().map(|&sum| f64::from(sum)).sum())
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn limit(new: &mut [f32], old: &[f32]) -> f32 {
-    let mut sums = [0.0; LANES];
-    for (new, old) in new.chunks_mut(LANES).zip(old.chunks(LANES)) {
-        for lane in 0..new.len() {
-            let increment = (new[lane] - old[lane]).clamp(-LARGEST_INCREMENT, LARGEST_INCREMENT);
+fn clip_row(row: &mut [f32], start: &[f32]) -> f32 {
+    let mut sums = [0.0f32; LANES];
+    let (blocks, rest) = row.as_chunks_mut::<LANES>();
+    let (starts, start_rest) = start.as_chunks::<LANES>();
+    for (block, start) in blocks.iter_mut().zip(starts) {
+        for lane in 0..LANES {
+            let increment = clipped(block[lane] - start[lane]);
             sums[lane] += increment.abs();
-            new[lane] = old[lane] + increment;
+            block[lane] = start[lane] + increment;
         }
     }
-    sums.iter().sum()
+    let mut sum = sums.iter().sum();
+    for (new, old) in rest.iter_mut().zip(start_rest) {
+        let increment = clipped(*new - old);
+        sum += increment.abs();
+        *new = old + increment;
+    }
+    sum
 }
 
-/// Adds the springs, which act on the matrix alone as their rest is 0, and multiplies all by the gain.
-fn weigh(work: &mut Work, width: usize, control: &Control) -> Result<()> {
-    let Work { equations: NormalEquations { a11, a12, a22, c1, c2 }, springs, gain, .. } = work;
-    let planes = [&mut a11[..], &mut a12[..], &mut a22[..], &mut c1[..], &mut c2[..]];
-    for_each_rows(planes, [width; 5], control, |y, rows| {
-        let row = y * width..(y + 1) * width;
-        let (springs, gain) = (&springs[row.clone()], &gain[row]);
-        let [a11, a12, a22, c1, c2] = rows;
-        for diagonal in [a11, a22] {
-            let terms = diagonal.iter_mut().zip(springs).zip(gain);
-            terms.for_each(|((a, spring), g)| *a = (*a + spring) * g);
-        }
-        for plane in [a12, c1, c2] {
-            plane.iter_mut().zip(gain).for_each(|(term, g)| *term *= g);
-        }
-    })
+#[inline(always)]
+fn clipped(increment: f32) -> f32 {
+    let above = if increment < -LARGEST_INCREMENT { -LARGEST_INCREMENT } else { increment };
+    if above > LARGEST_INCREMENT { LARGEST_INCREMENT } else { above }
 }

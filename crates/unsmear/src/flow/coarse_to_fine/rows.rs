@@ -5,6 +5,7 @@
 
 use rayon::prelude::*;
 
+use crate::array::FEW;
 use crate::control::Control;
 use crate::error::Result;
 
@@ -24,13 +25,51 @@ pub(super) fn for_each_rows<const N: usize>(
     control: &Control,
     row: impl Fn(usize, [&mut [f32]; N]) + Sync,
 ) -> Result<()> {
-    let mut tasks: Vec<[&mut [f32]; N]> = Vec::new();
+    // Few samples are not worth a second thread.
+    let few = planes[0].len() <= FEW;
+    let height = if few { planes[0].len() } else { ROWS_PER_TASK };
+    for_each_band(planes, widths, height, control, |first, mut band| {
+        for i in 0..band[0].len() / widths[0] {
+            control.check()?;
+            row(first + i, row_of(&mut band, widths, i));
+        }
+        Ok(())
+    })
+}
+
+/// Row `i` of packed planes with rows of `widths` samples.
+pub(super) fn row_of<'a, T, const N: usize>(
+    planes: &'a mut [&mut [T]; N],
+    widths: [usize; N],
+    i: usize,
+) -> [&'a mut [T]; N] {
+    let mut at = 0;
+    planes.each_mut().map(|plane| {
+        at += 1;
+        let width = widths[at - 1];
+        &mut plane[i * width..(i + 1) * width]
+    })
+}
+
+/// Runs `band(first, rows)` for every `height` rows, or what is left of them, of `N` packed planes
+/// with rows of `widths` samples; `first` is the number of the first row.
+///
+/// # Errors
+/// What `band` returns; the planes are then undefined.
+pub(super) fn for_each_band<T: Send, const N: usize>(
+    planes: [&mut [T]; N],
+    widths: [usize; N],
+    height: usize,
+    control: &Control,
+    band: impl Fn(usize, [&mut [T]; N]) -> Result<()> + Sync,
+) -> Result<()> {
+    let mut tasks: Vec<[&mut [T]; N]> = Vec::new();
     let mut rest = planes;
     while rest.iter().zip(widths).all(|(plane, width)| width > 0 && !plane.is_empty()) {
         let mut at = 0;
-        let mut task: [&mut [f32]; N] = [(); N].map(|()| [].as_mut_slice());
+        let mut task: [&mut [T]; N] = [(); N].map(|()| [].as_mut_slice());
         rest = rest.map(|plane| {
-            let count = (ROWS_PER_TASK * widths[at]).min(plane.len());
+            let count = (height * widths[at]).min(plane.len());
             let (head, tail) = plane.split_at_mut(count);
             task[at] = head;
             at += 1;
@@ -38,21 +77,9 @@ pub(super) fn for_each_rows<const N: usize>(
         });
         tasks.push(task);
     }
-    tasks.into_par_iter().enumerate().try_for_each(|(number, mut planes)| {
-        let rows = planes[0].len() / widths[0];
-        for i in 0..rows {
-            control.check()?;
-            let mut at = 0;
-            row(
-                number * ROWS_PER_TASK + i,
-                planes.each_mut().map(|plane| {
-                    at += 1;
-                    let width = widths[at - 1];
-                    &mut plane[i * width..(i + 1) * width]
-                }),
-            );
-        }
-        Ok(())
+    tasks.into_par_iter().enumerate().try_for_each(|(number, planes)| {
+        control.check()?;
+        band(number * height, planes)
     })
 }
 

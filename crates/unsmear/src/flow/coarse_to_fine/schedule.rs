@@ -13,7 +13,9 @@ use super::confidence::{Clues, confidence};
 use super::evidence::gather;
 use super::frames::FramePyramid;
 use super::level::{Level, Settings};
+use super::refine::Workspace;
 use super::still::spring;
+use crate::awake::awake;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -21,6 +23,9 @@ use crate::pyramid::{Resampling, resample};
 
 /// Ratio of sizes up to which a level is evidence of motion at a pixel; coarser ones tell of its surroundings.
 const FARTHEST_EVIDENCE: usize = 8;
+
+/// Sums side by side.
+const LANES: usize = 16;
 
 /// Everything that a climb needs.
 pub(super) struct Climb<'a> {
@@ -67,25 +72,26 @@ impl Climb<'_> {
         let mut flow = FlowField { u: Array2::zeros((0, 0)), v: Array2::zeros((0, 0)) };
         let (mut evidence, mut trust) = (None, None);
         let (mut resting, mut levels) = (Vec::new(), Vec::new());
+        let filters = self.settings.bank.wavevectors().len();
+        let mut workspace = Workspace::new(others.len(), filters, self.sizes[self.finest]);
         for (level, &size) in self.sizes.iter().enumerate().skip(self.finest).rev() {
-            flow = enlarge(&flow, size, control)?;
-            self.at(level, others, control, |prepared| {
+            // Not the enlarged flow but the small one is kept for the comparison at the end.
+            let coarser = flow;
+            let start = enlarge(&coarser, size, control)?;
+            workspace.finest = level == self.finest;
+            flow = self.at(level, others, control, |prepared| {
                 let mut pull = 0.0;
                 let mut springs = None;
-                let mut sights: Vec<_> = others.iter().map(|_| prepared.sight()).collect();
-                if let Some(rest) = prepared.look_for_rest(&mut sights[0], control)? {
+                if let Some(rest) = prepared.look_for_rest(control)? {
                     let spring = spring(&rest, prepared.zoom, &resting, control)?;
                     pull = mean(&spring);
                     springs = Some(spring);
-                    resting.push((prepared.zoom, rest.rest));
+                    if level > self.finest {
+                        resting.push((prepared.zoom, rest.rest));
+                    }
                 }
-                let refined = prepared.refine(
-                    flow.clone(),
-                    self.warps[level],
-                    springs,
-                    &mut sights,
-                    control,
-                )?;
+                let refined =
+                    prepared.refine(start, self.warps[level], springs, &mut workspace, control)?;
                 levels.push(LevelTrace {
                     frames: others.len(),
                     size,
@@ -97,19 +103,22 @@ impl Climb<'_> {
                     evidence = Some(gather(evidence.take(), &refined.trace, control)?);
                 }
                 if level == self.finest {
-                    let coherence = prepared.coherence(&refined.flow, &mut sights[0], control)?;
-                    let equations = &refined.equations;
+                    let coherence = prepared.coherence(&refined.flow, control)?;
+                    let coarser = if level + 1 < self.sizes.len() {
+                        Some(enlarge(&coarser, size, control)?)
+                    } else {
+                        None
+                    };
                     let clues = Clues {
                         coherence: &coherence,
                         flow: &refined.flow,
-                        coarser: (level + 1 < self.sizes.len()).then_some(&flow),
+                        coarser: coarser.as_ref(),
                         zoom: prepared.zoom,
-                        matrix: [&equations.a11, &equations.a12, &equations.a22],
+                        matrix: refined.matrix.each_ref().map(|plane| &plane[..]),
                     };
                     trust = Some(confidence(&clues, control)?);
                 }
-                flow = refined.flow;
-                Ok(())
+                Ok(refined.flow)
             })?;
         }
         let nothing = || Array2::zeros(flow.dim());
@@ -118,7 +127,7 @@ impl Climb<'_> {
         Ok(Summit { flow, confidence, evidence, levels })
     }
 
-    /// Prepares a level and hands it to `work`.
+    /// Prepares a level and hands it to `work`, all threads awake.
     pub(super) fn at<R>(
         &self,
         level: usize,
@@ -126,19 +135,27 @@ impl Climb<'_> {
         control: &Control,
         work: impl FnOnce(&Level<'_>) -> Result<R>,
     ) -> Result<R> {
-        let sigma = self.settings.bank.sigma();
-        let here = self.reference.at(level, sigma, control)?;
-        let others = others
-            .iter()
-            .map(|frame| frame.at(level, sigma, control))
-            .collect::<Result<Vec<_>>>()?;
-        let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
-        work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
+        awake(|| {
+            let sigma = self.settings.bank.sigma();
+            let here = self.reference.at(level, sigma, control)?;
+            let others = others
+                .iter()
+                .map(|frame| frame.at(level, sigma, control))
+                .collect::<Result<Vec<_>>>()?;
+            let zoom = self.sizes[0].1 as f32 / self.sizes[level].1 as f32;
+            work(&Level::new(self.settings, zoom, &here, &self.channels[level], &others, control)?)
+        })
     }
 }
 
 fn mean(plane: &Array2<f32>) -> f64 {
-    plane.iter().map(|&s| f64::from(s)).sum::<f64>() / plane.len() as f64
+    let (blocks, rest) = plane.as_slice().unwrap_or_default().as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for block in blocks {
+        sums.iter_mut().zip(block).for_each(|(sum, &s)| *sum += f64::from(s));
+    }
+    let rest: f64 = rest.iter().map(|&s| f64::from(s)).sum();
+    (sums.iter().sum::<f64>() + rest) / plane.len() as f64
 }
 
 /// The flow at another size, motions with it; of no flow, no motion.

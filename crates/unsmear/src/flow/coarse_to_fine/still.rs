@@ -23,12 +23,11 @@ use multiversion::multiversion;
 use ndarray::{Array2, Zip};
 
 use super::exponential::falling;
-use super::phase_constraint::TERMS;
+use super::look::Look;
+use super::phase_constraint::{Filters, TERMS};
 use super::rows::for_each_rows;
-use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
-use crate::gabor::Responses;
 use crate::pyramid::{Resampling, resample, smooth};
 
 /// The spring where rest is certain, in units of the data term.
@@ -50,51 +49,71 @@ pub(super) struct Rest {
     pub(super) rest: Array2<f32>,
 }
 
-/// Looks at the constraints of the unwarped frame, as [`super::phase_constraint::constrain`] makes them.
+/// What a look at the unwarped frame tells.
 ///
 /// `floor` is `r^2`, `wavenumber` `k_0`, `zoom` is `z`.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn look_for_rest(
-    responses: [&Responses<f32>; 2],
-    constraints: &[f32],
+    look: &Look<'_>,
+    filters: &Filters,
     floor: f32,
     wavenumber: f64,
     zoom: f32,
     control: &Control,
 ) -> Result<Rest> {
-    let (filters, height, width) = responses[0].dim();
-    let [mut motion, mut pattern] = [(); 2].map(|()| Array2::<f32>::zeros((height, width)));
-    for (plane, of_motion) in [(&mut motion, true), (&mut pattern, false)] {
-        let samples = plane.as_slice_mut().unwrap_or_default();
-        for_each_row(samples, width, control, |y, out| {
-            for j in 0..filters {
-                let [(a, b), (c, d)] = responses.map(|r| r.row(j, y));
-                let terms = &constraints[(y * filters + j) * TERMS * width..][..TERMS * width];
-                let (gx, gy, step) =
-                    (&terms[..width], &terms[width..2 * width], &terms[2 * width..3 * width]);
-                for x in 0..width {
-                    let power = (a[x] * a[x] + b[x] * b[x]).min(c[x] * c[x] + d[x] * d[x]);
-                    out[x] += power
-                        * if of_motion { step[x] * step[x] } else { gx[x] * gx[x] + gy[x] * gy[x] };
-                }
-            }
-        })?;
+    let (count, width) = (look.filters(), look.width);
+    let [mut motion, mut pattern] =
+        [(); 2].map(|()| Array2::<f32>::zeros((look.height, look.width)));
+    let planes = [&mut motion, &mut pattern].map(|p| p.as_slice_mut().unwrap_or_default());
+    let scratch = || vec![0.0; count * TERMS * width];
+    look.for_each_row(planes, [width; 2], control, scratch, |y, pair, seen, rows, terms| {
+        let [motion, pattern] = rows;
+        filters.constrain(y, pair, seen, terms);
+        for (j, terms) in terms.chunks_exact(TERMS * width).enumerate() {
+            add(pair.here(j), terms, motion, pattern);
+        }
+    })?;
+    judge(&motion, &pattern, (VISIBLE * wavenumber).powi(2) as f32 * floor, zoom, control)
+}
+
+/// Adds one filter's `A D_0^2` and `A |G|^2` on a row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add(responses: [(&[f32], &[f32]); 2], terms: &[f32], motion: &mut [f32], pattern: &mut [f32]) {
+    let n = motion.len();
+    let pattern = &mut pattern[..n];
+    let [(a, b), (c, d)] = responses.map(|(re, im)| (&re[..n], &im[..n]));
+    let (gx, gy, step) = (&terms[..n], &terms[n..2 * n], &terms[2 * n..3 * n]);
+    for x in 0..n {
+        let (one, other) = (a[x] * a[x] + b[x] * b[x], c[x] * c[x] + d[x] * d[x]);
+        let power = if one < other { one } else { other };
+        motion[x] += power * (step[x] * step[x]);
+        pattern[x] += power * (gx[x] * gx[x] + gy[x] * gy[x]);
     }
+}
+
+/// `Rest` of the sums; `least` is `r_0`.
+fn judge(
+    motion: &Array2<f32>,
+    pattern: &Array2<f32>,
+    least: f32,
+    zoom: f32,
+    control: &Control,
+) -> Result<Rest> {
     let mut rest = smooth(motion.view(), SIGMA, control)?;
     let mut pattern = smooth(pattern.view(), SIGMA, control)?;
-    let least = (VISIBLE * wavenumber).powi(2) as f32 * floor;
+    let width = rest.ncols();
     let planes = [&mut rest, &mut pattern].map(|p| p.as_slice_mut().unwrap_or_default());
     for_each_rows(planes, [width; 2], control, |_, [rest, pattern]| {
-        judge(rest, pattern, least, zoom * zoom / STILLNESS);
+        judge_row(rest, pattern, least, zoom * zoom / STILLNESS);
     })?;
     Ok(Rest { pattern, rest })
 }
 
 /// `E_n, E_g` on a row to the exponential and `E_g/(E_g + r_0)`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn judge(motion: &mut [f32], pattern: &mut [f32], least: f32, scale: f32) {
+fn judge_row(motion: &mut [f32], pattern: &mut [f32], least: f32, scale: f32) {
     let n = motion.len();
     let pattern = &mut pattern[..n];
     for x in 0..n {
@@ -129,16 +148,16 @@ mod tests {
 
     /// One filter that sees a pattern of amplitude 2 everywhere, moved by `step` rad, `G = (1.5, 0)`.
     fn rest_of(step: f32, zoom: f32) -> Rest {
-        let mut responses = Responses::zeros(1, 20, 20);
+        let (two, none) = ([2.0; 20], [0.0; 20]);
+        let terms = [[1.5; 20], [0.0; 20], [step; 20], [1.0; 20]].concat();
+        let [mut motion, mut pattern] = [(); 2].map(|()| Array2::zeros((20, 20)));
         for y in 0..20 {
-            responses.row_mut(0, y).0.fill(2.0);
+            let rows = [motion.row_mut(y), pattern.row_mut(y)].map(|row| row.into_slice().unwrap());
+            let [motion, pattern] = rows;
+            add([(&two, &none), (&none, &two)], &terms, motion, pattern);
         }
-        let mut constraints = Vec::new();
-        for _ in 0..20 {
-            constraints.extend([1.5, 0.0, step, 1.0].into_iter().flat_map(|term| [term; 20]));
-        }
-        let pair = [&responses, &responses];
-        look_for_rest(pair, &constraints, 0.25, 1.5, zoom, &Control::new()).unwrap()
+        judge(&motion, &pattern, (VISIBLE * 1.5).powi(2) as f32 * 0.25, zoom, &Control::new())
+            .unwrap()
     }
 
     #[test]
