@@ -63,7 +63,10 @@ def optical_flow(
 
     Every method filters the frames with Gabor filters and follows surfaces of constant
     phase, ``grad phi . (u, v, 1) = 0``; phase does not change with brightness and
-    contrast, so neither does the result.
+    contrast, so neither does the result. Where the light of the frames differs, the
+    coarse-to-fine methods bring them to the light of the reference first (gain, tone,
+    shading down to periods of 100 px), and leave out of all what one could not record
+    for saturation.
 
     Parameters
     ----------

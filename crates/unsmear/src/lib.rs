@@ -25,8 +25,8 @@
 //! | 8 | `flow::coarse_to_fine::response_pair` | rows of responses to two frames |
 //! | 8 | [`flow`], [`flow::thesis::bank`], `flow::coarse_to_fine::recorded`, `flow::coarse_to_fine::exponential`, `flow::coarse_to_fine::rows` | an estimate of flow, with confidence; the founding filters; frames as they come; parts of the default flow |
 //! | 9 | `flow::affine`, `flow::constraint`, `flow::normal_equations`, [`flow::standardize`] | parts of the flow methods |
-//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::slope`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible` | parts of the default flow |
-//! | 10 | `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::look`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
+//! | 9 | `flow::coarse_to_fine::arctangent`, `flow::coarse_to_fine::parameters`, `flow::coarse_to_fine::contrast`, `flow::coarse_to_fine::slope`, `flow::coarse_to_fine::known`, `flow::coarse_to_fine::guide`, `flow::coarse_to_fine::evidence`, `flow::coarse_to_fine::visible`, `flow::coarse_to_fine::lighting` | parts of the default flow |
+//! | 10 | `flow::coarse_to_fine::relight`, `flow::coarse_to_fine::phase_constraint`, `flow::coarse_to_fine::look`, `flow::coarse_to_fine::boundary`, `flow::coarse_to_fine::diffusivity` | |
 //! | 11 | `flow::coarse_to_fine::constraints`, `flow::coarse_to_fine::choice`, `flow::coarse_to_fine::still`, `flow::coarse_to_fine::confidence`, `flow::coarse_to_fine::round_trip` | |
 //! | 12 | `flow::coarse_to_fine::data_term`, `flow::coarse_to_fine::precision` | |
 //! | 13 | `flow::coarse_to_fine::level` | one scale |

@@ -5,7 +5,9 @@ use ndarray::{Array2, ArrayView2, ArrayView4, Axis};
 use super::contrast::Contrast;
 use super::known::{coverage, fill};
 use super::level::Frame;
+use super::lighting::Light;
 use super::recorded::{Reading, Sample};
+use super::relight::{luma, relight};
 use crate::array::require_same;
 use crate::control::Control;
 use crate::error::{Error, Result};
@@ -58,14 +60,72 @@ pub(super) struct Plan<'a, 's, T> {
 }
 
 impl<T: Sample> Plan<'_, '_, T> {
-    pub(super) fn frame(&self, offset: f32, t: usize, control: &Control) -> Result<FramePyramid> {
+    /// The reference frame.
+    pub(super) fn reference(&self, control: &Control) -> Result<FramePyramid> {
+        let (picture, known) = self.read(self.sequence.index, Reading::Grey, control)?;
+        self.levels(0.0, picture, known, control)
+    }
+
+    /// The frames at these offsets and indices, in the light of the reference, which loses what they cannot show.
+    pub(super) fn others(
+        &self,
+        reference: &mut FramePyramid,
+        offsets: Vec<(f32, usize)>,
+        control: &Control,
+    ) -> Result<Vec<FramePyramid>> {
+        let light = Light::measure(&reference.pictures[0], control)?;
+        let mut seen = None;
+        let mut others = Vec::with_capacity(offsets.len());
+        for (offset, t) in offsets {
+            let (mut picture, known) = self.read(t, Reading::Grey, control)?;
+            let change = light.change(&Light::measure(&picture, control)?);
+            if change > 0.0 {
+                let seen = match &mut seen {
+                    Some(planes) => planes,
+                    none => none.insert(self.planes(self.sequence.index, control)?),
+                };
+                let mut given = self.planes(t, control)?;
+                picture = relight(seen, &mut given, change, control)?;
+            }
+            others.push(self.levels(offset, picture, known, control)?);
+        }
+        if let Some(planes) = seen {
+            let picture = luma(&planes, control)?;
+            reference.pictures = pyramid(picture, self.sizes, self.factor, control)?;
+        }
+        Ok(others)
+    }
+
+    /// The channels of a frame, each as [`Plan::read`].
+    fn planes(&self, t: usize, control: &Control) -> Result<Vec<Array2<f32>>> {
+        let channels = 0..self.sequence.frames.len_of(Axis(3));
+        channels.map(|c| Ok(self.read(t, Reading::Channel(c), control)?.0)).collect()
+    }
+
+    /// A frame standardised and filled, and the map of the known unless all is known.
+    fn read(
+        &self,
+        t: usize,
+        reading: Reading,
+        control: &Control,
+    ) -> Result<(Array2<f32>, Option<Array2<f32>>)> {
         let frame = self.sequence.frames.index_axis(Axis(0), t);
-        let (mut picture, mut unknown) = self.contrast.apply(frame, Reading::Grey, control)?;
+        let (mut picture, mut unknown) = self.contrast.apply(frame, reading, control)?;
         if let Some(mask) = self.sequence.mask {
             picture.zip_mut_with(&mask, |s, &keep| *s = if keep { *s } else { f32::NAN });
             unknown = true;
         }
         let known = if unknown { fill(&mut picture, control)? } else { None };
+        Ok((picture, known))
+    }
+
+    fn levels(
+        &self,
+        offset: f32,
+        picture: Array2<f32>,
+        known: Option<Array2<f32>>,
+        control: &Control,
+    ) -> Result<FramePyramid> {
         let levels = |picture| pyramid(picture, self.sizes, self.factor, control);
         Ok(FramePyramid {
             offset,

@@ -36,6 +36,7 @@ mod frames;
 mod guide;
 mod known;
 mod level;
+mod lighting;
 mod look;
 mod noise_rule;
 mod parameters;
@@ -43,6 +44,7 @@ mod phase_constraint;
 mod precision;
 mod recorded;
 mod refine;
+mod relight;
 mod response_pair;
 mod round_trip;
 mod rows;
@@ -139,12 +141,9 @@ impl CoarseToFine {
             return Ok((Estimate { flow, confidence }, Vec::new()));
         }
         let plan = Plan { sequence, contrast, sizes: &sizes, factor: self.pyramid_factor };
-        let reference = plan.frame(0.0, sequence.index, control)?;
-        let others = self
-            .offsets(sequence.index, count)
-            .into_iter()
-            .map(|(offset, t)| plan.frame(offset, t, control))
-            .collect::<Result<Vec<_>>>()?;
+        let mut reference = plan.reference(control)?;
+        let offsets = self.offsets(sequence.index, count);
+        let others = plan.others(&mut reference, offsets, control)?;
         let channels = plan.channels(&reference, colour, control)?;
         if self.adapt_to_noise {
             let picture = reference.pictures[0].as_slice().unwrap_or_default();

@@ -70,11 +70,11 @@ impl CoarseToFine {
             finest_warps: 2,
             passes: 2,
             sweeps: 10,
-            smoothness: 0.1,
+            smoothness: 0.11,
             edge_sensitivity: 2.0,
             strongest_channel: false,
             residual_scale: 1.0,
-            precision_scale: 0.25,
+            precision_scale: 0.3,
             tau: 1.25,
             amplitude_fraction: 0.05,
             amplitude_floor: 0.2,
@@ -106,6 +106,7 @@ impl CoarseToFine {
             edge_sensitivity: 2.5,
             strongest_channel: true,
             residual_scale: 0.7,
+            precision_scale: 0.25,
             ..Self::balanced()
         }
     }

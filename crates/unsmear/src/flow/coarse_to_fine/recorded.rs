@@ -11,7 +11,7 @@ use multiversion::multiversion;
 use ndarray::ArrayView2;
 
 /// Weights of red, green and blue.
-const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
+pub(super) const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// A type that pictures come in.
 pub trait Sample: Copy + Send + Sync + 'static {
