@@ -8,64 +8,92 @@ use multiversion::multiversion;
 
 use super::lanes::{LANES, Lanes, Prepared, four_taps};
 use super::plan::{Kind, Record, RowPlan, line_of};
+use super::strands::Strands;
 
 /// Added and subtracted, rounds to a whole number whatever is far smaller: 3/2 2^23.
 const WHOLE: f32 = 12_582_912.0;
 
-/// The rows of weights of one record.
-#[derive(Debug, Default)]
-pub(super) struct Expanded {
-    /// 16 weights each.
-    pub(super) weights: Vec<Lanes>,
-    /// What they weigh begins so many samples after the record's first pixel.
-    pub(super) deltas: Vec<i32>,
-    /// Rows in use.
-    pub(super) count: usize,
+/// The rows of weights of `N` records that are swept as one.
+#[derive(Debug)]
+pub(super) struct Expanded<const N: usize> {
+    /// 16 weights of each record.
+    pub(super) weights: Vec<[Lanes; N]>,
+    /// What they weigh begins so many samples to the right of a record's first pixel and so many below.
+    pub(super) places: Vec<[i32; 2]>,
+    /// Where what is scattered goes.
+    pub(super) strands: Strands,
+    /// Lanes and lines that this is made from.
+    from: Option<([u32; N], u32)>,
 }
 
-impl Expanded {
-    /// Makes room for `rows` rows.
-    fn reserve(&mut self, rows: usize) {
-        if self.weights.len() < rows {
-            self.weights.resize(rows, Lanes::ZERO);
-            self.deltas.resize(rows, 0);
+impl<const N: usize> Expanded<N> {
+    pub(super) fn new() -> Self {
+        let (weights, places) = (Vec::new(), Vec::new());
+        Self { weights, places, strands: Strands::default(), from: None }
+    }
+
+    /// Forgets what is written out: another row's plan follows.
+    pub(super) fn forget(&mut self) {
+        self.from = None;
+    }
+
+    /// Writes out `records` of `plan`, unless that is what was written out last.
+    pub(super) fn renew<const CUBIC: bool>(&mut self, plan: &RowPlan, records: &[Record; N]) {
+        let from = Some((records.map(|record| record.lanes), records[0].lines));
+        if self.from == from && records[0].kind != Kind::Still {
+            return;
         }
-        self.count = rows;
+        self.from = from;
+        let rows = records[0].rows as usize;
+        self.weights.resize(rows, [Lanes::ZERO; N]);
+        self.places.clear();
+        if records[0].kind == Kind::Still {
+            self.weights[0] = records.map(|record| record.lanes_of(&plan.lanes)[0]);
+            self.places.push([0, 0]);
+        } else {
+            self.set_places::<CUBIC>(plan, &records[0]);
+            for (i, record) in records.iter().enumerate() {
+                if i > 0 && record.lanes == records[i - 1].lanes {
+                    self.weights.iter_mut().for_each(|row| row[i] = row[i - 1]);
+                } else {
+                    expand::<CUBIC, N>(plan, record, i, &mut self.weights);
+                }
+            }
+        }
+        self.strands.find(&self.places);
+    }
+
+    fn set_places<const CUBIC: bool>(&mut self, plan: &RowPlan, record: &Record) {
+        let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
+        for (i, line) in record.lines_of(&plan.lines).iter().enumerate() {
+            let along = i32::from(record.first) + i as i32;
+            for k in 0..taps + i32::from(line.span) {
+                let across = i32::from(line.floor) - before + k;
+                self.places.push(if record.down { [across, along] } else { [along, across] });
+            }
+        }
     }
 }
 
-/// Writes out `record` of `plan` for a picture of rows of `stride` samples.
+/// Writes out `record` of `plan` as number `at` of its group.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn expand<const CUBIC: bool>(
+fn expand<const CUBIC: bool, const N: usize>(
     plan: &RowPlan,
     record: &Record,
-    stride: i32,
-    out: &mut Expanded,
+    at: usize,
+    out: &mut [[Lanes; N]],
 ) {
-    out.reserve(record.rows as usize);
-    let lanes = record.lanes_of(&plan.lanes);
-    if record.kind == Kind::Still {
-        (out.weights[0], out.deltas[0]) = (lanes[0], 0);
-        return;
-    }
-    let (along, across) = if record.down { (stride, 1) } else { (1, stride) };
-    let lines = &plan.lines[record.lines as usize..][..usize::from(record.count)];
-    let prepared = Prepared::new::<CUBIC>(lanes);
+    let prepared = Prepared::new::<CUBIC>(record.lanes_of(&plan.lanes));
     let mut row = 0;
-    for (i, line) in lines.iter().enumerate() {
+    for (i, line) in record.lines_of(&plan.lines).iter().enumerate() {
         let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
-        let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
-        let count = taps + usize::from(line.span);
-        let rows = &mut out.weights[row..];
+        let count = if CUBIC { 4 } else { 2 } + usize::from(line.span);
+        let rows = &mut out[row..];
         let floor = f32::from(line.floor);
         match line.span {
-            0 => level::<CUBIC>(&weight, &minor, floor, rows),
-            1 => one_step::<CUBIC>(&weight, &minor, floor, rows),
-            _ => steep::<CUBIC>(&weight, &minor, floor, count, rows),
-        }
-        let first = (i32::from(record.first) + i as i32) * along;
-        for (k, delta) in out.deltas[row..row + count].iter_mut().enumerate() {
-            *delta = first + (i32::from(line.floor) - before + k as i32) * across;
+            0 => level::<CUBIC, N>(&weight, &minor, floor, at, rows),
+            1 => one_step::<CUBIC, N>(&weight, &minor, floor, at, rows),
+            _ => steep::<CUBIC, N>(&weight, &minor, floor, count, at, rows),
         }
         row += count;
     }
@@ -73,9 +101,16 @@ pub(super) fn expand<const CUBIC: bool>(
 
 /// All floors are `floor`.
 #[inline(always)]
-fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mut [Lanes]) {
+fn level<const CUBIC: bool, const N: usize>(
+    weight: &Lanes,
+    minor: &Lanes,
+    floor: f32,
+    at: usize,
+    rows: &mut [[Lanes; N]],
+) {
     if CUBIC {
         let [r0, r1, r2, r3, ..] = rows else { return };
+        let [r0, r1, r2, r3] = [r0, r1, r2, r3].map(|row| &mut row[at]);
         for i in 0..LANES {
             let taps = four_taps::<CUBIC>(minor.0[i] - floor);
             r0.0[i] = weight.0[i] * taps[0];
@@ -85,6 +120,7 @@ fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mu
         }
     } else {
         let [r0, r1, ..] = rows else { return };
+        let [r0, r1] = [r0, r1].map(|row| &mut row[at]);
         for i in 0..LANES {
             let taps = four_taps::<CUBIC>(minor.0[i] - floor);
             r0.0[i] = weight.0[i] * taps[1];
@@ -95,9 +131,16 @@ fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mu
 
 /// Floors are `floor` or the next.
 #[inline(always)]
-fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mut [Lanes]) {
+fn one_step<const CUBIC: bool, const N: usize>(
+    weight: &Lanes,
+    minor: &Lanes,
+    floor: f32,
+    at: usize,
+    rows: &mut [[Lanes; N]],
+) {
     if CUBIC {
         let [r0, r1, r2, r3, r4, ..] = rows else { return };
+        let [r0, r1, r2, r3, r4] = [r0, r1, r2, r3, r4].map(|row| &mut row[at]);
         for i in 0..LANES {
             let f = minor.0[i] - floor;
             let up = f >= 1.0;
@@ -111,6 +154,7 @@ fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: 
         }
     } else {
         let [r0, r1, r2, ..] = rows else { return };
+        let [r0, r1, r2] = [r0, r1, r2].map(|row| &mut row[at]);
         for i in 0..LANES {
             let f = minor.0[i] - floor;
             let up = f >= 1.0;
@@ -125,12 +169,13 @@ fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: 
 
 /// Floors differ by any number; writes the first `count` rows.
 #[inline(always)]
-fn steep<const CUBIC: bool>(
+fn steep<const CUBIC: bool, const N: usize>(
     weight: &Lanes,
     minor: &Lanes,
     floor: f32,
     count: usize,
-    rows: &mut [Lanes],
+    at: usize,
+    rows: &mut [[Lanes; N]],
 ) {
     let (mut taps, mut up) = ([Lanes::ZERO; 4], Lanes::ZERO);
     for i in 0..LANES {
@@ -148,7 +193,7 @@ fn steep<const CUBIC: bool>(
     let first = if CUBIC { 0.0 } else { 1.0 };
     for k in 0..count {
         // The way out, never taken, keeps the loop over rows a loop over rows: the one within is to be vectorised.
-        let Some(row) = rows.get_mut(k) else { return };
+        let Some(row) = rows.get_mut(k).map(|row| &mut row[at]) else { return };
         for i in 0..LANES {
             let tap = k as f32 + first - up.0[i];
             let low = if tap == 0.0 { taps[0].0[i] } else { 0.0 };

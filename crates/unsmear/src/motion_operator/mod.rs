@@ -29,8 +29,10 @@
 //! [10.1109/TASSP.1981.1163711](https://doi.org/10.1109/TASSP.1981.1163711).
 
 mod expand;
+mod group;
 mod lanes;
 mod plan;
+mod strands;
 mod sweep;
 
 use rayon::prelude::*;
@@ -40,7 +42,7 @@ use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
 use lanes::LANES;
 use plan::RowPlan;
-use sweep::{Scratch, gather_row, normal_row, scatter_row};
+use sweep::{Scratch, Window, gather_row, normal_row, scatter_row};
 
 pub use lanes::Taps;
 
@@ -90,11 +92,11 @@ impl MotionOperator {
     fn gather(&self, x: &[f32], pad: usize, b: &mut [f32]) {
         let stride = self.width + 2 * pad;
         b.par_chunks_mut(self.width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
             for (i, out) in rows.chunks_mut(self.width).enumerate() {
                 let y = task * ROWS_PER_TASK + i;
-                let (plan, start) = (&self.plans[y], (y + pad) * stride + pad);
-                gather_row(plan, self.taps, x, stride, start, out, &mut scratch);
+                let x = Window { samples: x, stride, start: (y + pad) * stride + pad };
+                gather_row(&self.plans[y], self.taps, &x, out, &mut scratch);
             }
         });
     }
@@ -104,10 +106,11 @@ impl MotionOperator {
         let stride = self.width + 2 * pad;
         let rows = r.par_chunks(self.width * self.band());
         self.for_each_band(x, pad, rows, |y, place, rows| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
+            let mut x = Window { samples: place, stride, start: self.reach * stride + pad };
             for (i, row) in rows.chunks(self.width).enumerate() {
-                let (plan, start) = (&self.plans[y + i], (i + self.reach) * stride + pad);
-                scatter_row(plan, self.taps, row, stride, start, place, &mut scratch);
+                scatter_row(&self.plans[y + i], self.taps, row, &mut x, &mut scratch);
+                x.start += stride;
             }
         });
     }
@@ -215,12 +218,15 @@ impl LinearOperator for MotionOperator {
         let (pad, chunk) = (self.pad, self.width * self.band());
         let data = b.par_chunks_mut(chunk).zip(weights.par_chunks(chunk));
         self.for_each_band(out, pad, data, |y, place, (b, weights)| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
+            let mut x = Window { samples: x, stride: columns, start: (y + pad) * columns + pad };
+            let start = self.reach * columns + pad;
+            let mut out = Window { samples: place, stride: columns, start };
             let pairs = b.chunks_mut(self.width).zip(weights.chunks(self.width));
             for (i, (b, weights)) in pairs.enumerate() {
-                let (from, to) = ((y + i + pad) * columns + pad, (i + self.reach) * columns + pad);
-                let (plan, scratch) = (&self.plans[y + i], &mut scratch);
-                normal_row(plan, self.taps, x, weights, columns, from, b, place, to, scratch);
+                normal_row(&self.plans[y + i], self.taps, &x, weights, b, &mut out, &mut scratch);
+                x.start += columns;
+                out.start += columns;
             }
         });
     }

@@ -10,6 +10,7 @@
 
 use multiversion::multiversion;
 
+use super::group::{group, rows_of};
 use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
 use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
@@ -62,10 +63,15 @@ impl Record {
     pub(super) fn lanes_of<'a>(&self, lanes: &'a [Lanes]) -> &'a [Lanes] {
         &lanes[self.lanes as usize..][..usize::from(self.planes)]
     }
+
+    /// Its lines out of those of its row.
+    pub(super) fn lines_of<'a>(&self, lines: &'a [Line]) -> &'a [Line] {
+        &lines[self.lines as usize..][..usize::from(self.count)]
+    }
 }
 
 /// Minor positions of a block on one line: the floor of the least, and how much greater that of the greatest is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
     pub(super) floor: i16,
     pub(super) span: u16,
@@ -75,6 +81,8 @@ pub(super) struct Line {
 #[derive(Debug, Clone, Default)]
 pub(super) struct RowPlan {
     pub(super) records: Vec<Record>,
+    /// How many of them, from the first on, are swept as one; see `group.rs`.
+    pub(super) groups: Vec<u8>,
     pub(super) lines: Vec<Line>,
     pub(super) lanes: Vec<Lanes>,
     /// Rows or columns from a pixel to what it reads, at most.
@@ -113,8 +121,9 @@ impl RowPlan {
                 plan.push_block(column, block, down, taps);
             }
         }
+        (plan.groups, plan.lines) =
+            group(&mut plan.records, &plan.lines, 2 * taps.reach() as u32);
         plan.records.shrink_to_fit();
-        plan.lines.shrink_to_fit();
         plan.lanes.shrink_to_fit();
         plan
     }
@@ -167,8 +176,7 @@ impl RowPlan {
         for (gain, sum) in self.lanes[record.lanes as usize].0.iter_mut().zip(sums.0) {
             *gain = if *gain > 0.0 { 1.0 / sum } else { 0.0 };
         }
-        let rows = |line: &Line| u32::from(line.span) + 2 * taps.reach() as u32;
-        record.rows = self.lines[before..].iter().map(rows).sum();
+        record.rows = rows_of(&self.lines[before..], 2 * taps.reach() as u32);
         let ends = [record.first, record.first + record.count as i16 - 1];
         let across = self.lines[before..].iter().flat_map(|line| {
             let last = i32::from(line.floor) + i32::from(line.span) + 2;
@@ -176,7 +184,19 @@ impl RowPlan {
         });
         let farthest = across.chain(ends.map(i32::from)).map(i32::unsigned_abs).max();
         self.reach = self.reach.max(farthest.map_or(0, |z| z as usize));
+        self.share_lanes(&mut record);
         self.records.push(record);
+    }
+
+    /// Lets a record whose lanes are those of the one before use them.
+    fn share_lanes(&mut self, record: &mut Record) {
+        let Some(last) = self.records.last().filter(|last| last.planes == record.planes) else {
+            return;
+        };
+        if last.lanes_of(&self.lanes) == record.lanes_of(&self.lanes) {
+            self.lanes.truncate(record.lanes as usize);
+            record.lanes = last.lanes;
+        }
     }
 }
 
