@@ -22,49 +22,56 @@ pub(super) struct Expanded<const N: usize> {
     pub(super) places: Vec<[i32; 2]>,
     /// Where what is scattered goes.
     pub(super) strands: Strands,
-    /// Lanes and lines that this is made from.
-    from: Option<([u32; N], u32)>,
+    /// The records' lanes that the weights are made from.
+    lanes: Option<[u32; N]>,
+    /// First line, lines and axis that the places are made from.
+    shape: Option<(i16, u32, bool)>,
 }
 
 impl<const N: usize> Expanded<N> {
     pub(super) fn new() -> Self {
         let (weights, places) = (Vec::new(), Vec::new());
-        Self { weights, places, strands: Strands::default(), from: None }
+        Self { weights, places, strands: Strands::default(), lanes: None, shape: None }
     }
 
     /// Forgets what is written out: another row's plan follows.
     pub(super) fn forget(&mut self) {
-        self.from = None;
+        (self.lanes, self.shape) = (None, None);
     }
 
     /// Writes out `records` of `plan`, unless that is what was written out last.
     pub(super) fn renew<const CUBIC: bool>(&mut self, plan: &RowPlan, records: &[Record; N]) {
-        let from = Some((records.map(|record| record.lanes), records[0].lines));
-        if self.from == from && records[0].kind != Kind::Still {
+        let lead = &records[0];
+        if lead.kind == Kind::Still {
+            self.forget();
+            self.weights.resize(1, [Lanes::ZERO; N]);
+            self.weights[0] = records.map(|record| record.lanes_of(&plan.lanes)[0]);
+            self.places.splice(.., [[0, 0]]);
+            return self.strands.find(&self.places);
+        }
+        let shape = Some((lead.first, lead.lines, lead.down));
+        let lanes = Some(records.map(|record| record.lanes));
+        if self.shape == shape && self.lanes == lanes {
             return;
         }
-        self.from = from;
-        let rows = records[0].rows as usize;
-        self.weights.resize(rows, [Lanes::ZERO; N]);
-        self.places.clear();
-        if records[0].kind == Kind::Still {
-            self.weights[0] = records.map(|record| record.lanes_of(&plan.lanes)[0]);
-            self.places.push([0, 0]);
-        } else {
-            self.set_places::<CUBIC>(plan, &records[0]);
-            for (i, record) in records.iter().enumerate() {
-                if i > 0 && record.lanes == records[i - 1].lanes {
-                    self.weights.iter_mut().for_each(|row| row[i] = row[i - 1]);
-                } else {
-                    expand::<CUBIC, N>(plan, record, i, &mut self.weights);
-                }
+        if self.shape != shape {
+            self.weights.resize(lead.rows as usize, [Lanes::ZERO; N]);
+            self.set_places::<CUBIC>(plan, lead);
+            self.strands.find(&self.places);
+        }
+        for (i, record) in records.iter().enumerate() {
+            if i > 0 && record.lanes == records[i - 1].lanes {
+                self.weights.iter_mut().for_each(|row| row[i] = row[i - 1]);
+            } else {
+                expand::<CUBIC, N>(plan, record, i, &mut self.weights);
             }
         }
-        self.strands.find(&self.places);
+        (self.shape, self.lanes) = (shape, lanes);
     }
 
     fn set_places<const CUBIC: bool>(&mut self, plan: &RowPlan, record: &Record) {
         let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
+        self.places.clear();
         for (i, line) in record.lines_of(&plan.lines).iter().enumerate() {
             let along = i32::from(record.first) + i as i32;
             for k in 0..taps + i32::from(line.span) {

@@ -35,6 +35,8 @@ mod plan;
 mod strands;
 mod sweep;
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -48,15 +50,17 @@ pub use lanes::Taps;
 
 /// Rows gathered per task.
 const ROWS_PER_TASK: usize = 8;
-/// Rows of data scattered per task, at least: some 2 ms of work on a wide picture.
-const LEAST_BAND: usize = 64;
+/// Rows of data scattered per task, at least: half a millisecond of work on a wide picture, and several tasks per thread
+/// on a low one.
+const LEAST_BAND: usize = 32;
 
 /// The blur of [`MotionPaths`]; see the [module](self).
 ///
 /// Holds 12 (straight paths) to 30 bytes per pixel.
 #[derive(Debug, Clone)]
 pub struct MotionOperator {
-    plans: Vec<RowPlan>,
+    /// Of every row; rows of equal paths share theirs.
+    plans: Vec<Arc<RowPlan>>,
     width: usize,
     taps: Taps,
     pad: usize,
@@ -80,8 +84,12 @@ impl MotionOperator {
                 return Err(Error::shape("paths", expected, field.u.shape()));
             }
         }
-        let row = |y| RowPlan::new(paths, y, taps);
-        let plans: Vec<RowPlan> = (0..height).into_par_iter().map(row).collect();
+        let row = |y| if y > 0 && rows_agree(paths, y) { None } else { Some(RowPlan::new(paths, y, taps)) };
+        let own: Vec<Option<RowPlan>> = (0..height).into_par_iter().map(row).collect();
+        let mut plans: Vec<Arc<RowPlan>> = Vec::with_capacity(height);
+        for plan in own {
+            plans.extend(plan.map(Arc::new).or_else(|| plans.last().cloned()));
+        }
         // A block wider than the picture writes zeros beyond it.
         let beyond = LANES.saturating_sub(width);
         let reach = plans.iter().map(|plan| plan.reach).max().unwrap_or(0) + beyond;
@@ -230,6 +238,14 @@ impl LinearOperator for MotionOperator {
             }
         });
     }
+}
+
+/// Whether row `y` has the paths of the row above, bit for bit.
+fn rows_agree(paths: &MotionPaths, y: usize) -> bool {
+    let fields = [&paths.velocity, &paths.curvature].into_iter().chain(&paths.offset);
+    fields.flat_map(|field| [&field.u, &field.v]).all(|plane| {
+        plane.row(y).iter().zip(plane.row(y - 1)).all(|(a, b)| a.to_bits() == b.to_bits())
+    })
 }
 
 #[cfg(test)]

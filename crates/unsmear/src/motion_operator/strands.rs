@@ -15,7 +15,7 @@
 use super::lanes::LANES;
 
 /// One row of products in a strand: its number, and s.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Tap {
     pub(super) row: u32,
     pub(super) shift: u32,
@@ -24,61 +24,57 @@ pub(super) struct Tap {
 /// Some taps, and where they begin in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Strand {
-    /// dy and least dx.
+    /// Least dx, and dy.
     pub(super) place: [i32; 2],
     /// Largest shift.
     pub(super) range: u32,
-    /// First tap, and the one after the last.
-    pub(super) taps: [u32; 2],
+    count: u32,
+    taps: [Tap; LANES],
 }
+
+impl Strand {
+    pub(super) fn taps(&self) -> &[Tap] {
+        &self.taps[..self.count as usize]
+    }
+}
+
+/// No strand of a dy yet.
+const NONE: u32 = u32::MAX;
 
 /// The strands of a group of blocks, and memory to find them.
 #[derive(Debug, Default)]
 pub(super) struct Strands {
-    pub(super) strands: Vec<Strand>,
-    pub(super) taps: Vec<Tap>,
-    starts: Vec<u32>,
-    order: Vec<u32>,
+    pub(super) all: Vec<Strand>,
+    /// The last strand of each dy.
+    last: Vec<u32>,
 }
 
 impl Strands {
     /// Finds the strands of rows at `places` (dx, dy), whose dx ascend within equal dy.
     pub(super) fn find(&mut self, places: &[[i32; 2]]) {
-        self.sort(places);
-        self.strands.clear();
-        self.taps.clear();
-        for &row in &self.order {
-            let [dx, dy] = places[row as usize];
-            let last = self.strands.last_mut().filter(|strand| {
-                strand.place[1] == dy && ((dx - strand.place[0]) as usize) < LANES
-            });
-            let (shift, end) = (last.as_ref().map_or(0, |s| (dx - s.place[0]) as u32), self.taps.len() as u32 + 1);
-            match last {
-                Some(strand) => (strand.range, strand.taps[1]) = (shift, end),
-                None => self.strands.push(Strand { place: [dx, dy], range: 0, taps: [end - 1, end] }),
+        let (mut least, mut most) = (i32::MAX, i32::MIN);
+        for &[_, dy] in places {
+            (least, most) = (least.min(dy), most.max(dy));
+        }
+        self.all.clear();
+        self.last.clear();
+        self.last.resize((most - least + 1) as usize, NONE);
+        for (row, &[dx, dy]) in (0..).zip(places) {
+            let last = &mut self.last[(dy - least) as usize];
+            if let Some(strand) = self.all.get_mut(*last as usize) {
+                let shift = (dx - strand.place[0]) as u32;
+                if let Some(tap) = strand.taps.get_mut(strand.count as usize)
+                    && (shift as usize) < LANES
+                {
+                    *tap = Tap { row, shift };
+                    strand.range = shift;
+                    strand.count += 1;
+                    continue;
+                }
             }
-            self.taps.push(Tap { row, shift });
-        }
-    }
-
-    /// Sets `order` to the rows by ascending dy, those of one dy as they came.
-    fn sort(&mut self, places: &[[i32; 2]]) {
-        let least = places.iter().map(|place| place[1]).min().unwrap_or(0);
-        let most = places.iter().map(|place| place[1]).max().unwrap_or(0);
-        self.starts.clear();
-        self.starts.resize((most - least) as usize + 2, 0);
-        for [_, dy] in places {
-            self.starts[(dy - least) as usize + 1] += 1;
-        }
-        for i in 1..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.order.clear();
-        self.order.resize(places.len(), 0);
-        for (row, [_, dy]) in places.iter().enumerate() {
-            let next = &mut self.starts[(dy - least) as usize];
-            self.order[*next as usize] = row as u32;
-            *next += 1;
+            *last = self.all.len() as u32;
+            let taps = [Tap { row, shift: 0 }; LANES];
+            self.all.push(Strand { place: [dx, dy], range: 0, count: 1, taps });
         }
     }
 }
@@ -94,18 +90,15 @@ mod tests {
         // Found twice: nothing of the first search may be left.
         found.find(&[[5, 5]]);
         found.find(&places);
-        let strands: Vec<_> = found
-            .strands
+        let strands: Vec<([i32; 2], u32, Vec<(u32, u32)>)> = found
+            .all
             .iter()
-            .map(|s| {
-                let taps = &found.taps[s.taps[0] as usize..s.taps[1] as usize];
-                (s.place, s.range, taps.iter().map(|t| (t.row, t.shift)).collect::<Vec<_>>())
-            })
+            .map(|s| (s.place, s.range, s.taps().iter().map(|t| (t.row, t.shift)).collect()))
             .collect();
         let expected = [
             ([-1, 3], 15, vec![(0, 0), (2, 1), (4, 15)]),
-            ([15, 3], 0, vec![(5, 0)]),
             ([-1, 4], 1, vec![(1, 0), (3, 1)]),
+            ([15, 3], 0, vec![(5, 0)]),
             ([15, 4], 0, vec![(6, 0)]),
         ];
         assert_eq!(strands, expected);

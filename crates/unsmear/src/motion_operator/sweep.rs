@@ -13,7 +13,7 @@ use super::expand::Expanded;
 use super::group::TOGETHER;
 use super::lanes::{LANES, Lanes, Taps};
 use super::plan::{Kind, Record, RowPlan};
-use super::strands::{Strand, Tap};
+use super::strands::Strand;
 
 /// A row of products of a group, between blocks of zeros.
 #[derive(Debug, Clone, Copy)]
@@ -297,15 +297,14 @@ fn scatter<const N: usize>(
         products.0[N + 1] = [0.0; LANES];
     }
     let place = x.place(&records[0]);
-    for strand in &rows.strands.strands {
-        let taps = &rows.strands.taps[strand.taps[0] as usize..strand.taps[1] as usize];
+    for strand in &rows.strands.all {
         let [dx, dy] = strand.place;
         let delta = dy as isize * x.stride as isize + dx as isize;
-        add_strand::<false, N>(products, strand, taps, x.samples, place.wrapping_add_signed(delta));
+        add_strand::<false, N>(products, strand, x.samples, place.wrapping_add_signed(delta));
         if records[0].kind == Kind::Straight {
             let delta = -delta - strand.range as isize;
             let place = place.wrapping_add_signed(delta);
-            add_strand::<true, N>(products, strand, taps, x.samples, place);
+            add_strand::<true, N>(products, strand, x.samples, place);
         }
     }
 }
@@ -315,12 +314,11 @@ fn scatter<const N: usize>(
 fn add_strand<const MIRRORED: bool, const N: usize>(
     products: &[Products],
     strand: &Strand,
-    taps: &[Tap],
     x: &mut [f32],
     place: usize,
 ) {
     let mut sums = [Lanes::ZERO; TOGETHER + 1];
-    for tap in taps {
+    for tap in strand.taps() {
         let shift = if MIRRORED { strand.range - tap.shift } else { tap.shift } as usize;
         let from = &products[tap.row as usize].0.as_flattened()[LANES - shift..];
         let from = &from[..(N + 1) * LANES].as_chunks().0[..=N];
