@@ -6,9 +6,11 @@
 
 use multiversion::multiversion;
 
+use super::group::Group;
 use super::lanes::{LANES, Lanes, Prepared, four_taps};
-use super::plan::{Kind, Record, RowPlan, line_of};
-use super::strands::Strands;
+use super::plan::{RowPlan, line_of};
+use super::record::{Kind, Line, Record};
+use super::strands::{Strand, Strands};
 
 /// Added and subtracted, rounds to a whole number whatever is far smaller: 3/2 2^23.
 const WHOLE: f32 = 12_582_912.0;
@@ -20,8 +22,9 @@ pub(super) struct Expanded<const N: usize> {
     pub(super) weights: Vec<[Lanes; N]>,
     /// What they weigh begins so many samples to the right of a record's first pixel and so many below.
     pub(super) places: Vec<[i32; 2]>,
-    /// Where what is scattered goes.
-    pub(super) strands: Strands,
+    /// Where what is scattered goes, if they were found for these places.
+    strands: Strands,
+    found: bool,
     /// The records' lanes that the weights are made from.
     lanes: Option<[u32; N]>,
     /// First line, lines and axis that the places are made from.
@@ -31,78 +34,104 @@ pub(super) struct Expanded<const N: usize> {
 impl<const N: usize> Expanded<N> {
     pub(super) fn new() -> Self {
         let (weights, places) = (Vec::new(), Vec::new());
-        Self { weights, places, strands: Strands::default(), lanes: None, shape: None }
+        Self {
+            weights,
+            places,
+            strands: Strands::default(),
+            found: false,
+            lanes: None,
+            shape: None,
+        }
     }
 
     /// Forgets what is written out: another row's plan follows.
     pub(super) fn forget(&mut self) {
-        (self.lanes, self.shape) = (None, None);
+        (self.lanes, self.shape, self.found) = (None, None, false);
     }
 
-    /// Writes out `records` of `plan`, unless that is what was written out last.
-    pub(super) fn renew<const CUBIC: bool>(&mut self, plan: &RowPlan, records: &[Record; N]) {
+    /// Writes out the `records` of a `group` of `plan`, unless that is what was written out last.
+    pub(super) fn renew<const CUBIC: bool>(
+        &mut self,
+        plan: &RowPlan,
+        group: &Group,
+        records: &[Record; N],
+    ) {
         let lead = &records[0];
         if lead.kind == Kind::Still {
             self.forget();
             self.weights.resize(1, [Lanes::ZERO; N]);
             self.weights[0] = records.map(|record| record.lanes_of(&plan.lanes)[0]);
             self.places.splice(.., [[0, 0]]);
-            return self.strands.find(&self.places);
+            return;
         }
-        let shape = Some((lead.first, lead.lines, lead.down));
+        let shape = Some((group.first, group.lines, lead.down));
         let lanes = Some(records.map(|record| record.lanes));
         if self.shape == shape && self.lanes == lanes {
             return;
         }
         if self.shape != shape {
-            self.weights.resize(lead.rows as usize, [Lanes::ZERO; N]);
-            self.set_places::<CUBIC>(plan, lead);
-            self.strands.find(&self.places);
+            self.weights.resize(group.rows as usize, [Lanes::ZERO; N]);
+            self.set_places::<CUBIC>(group.lines_of(&plan.lines), group.first, lead.down);
+            self.found = false;
         }
         for (i, record) in records.iter().enumerate() {
             if i > 0 && record.lanes == records[i - 1].lanes {
                 self.weights.iter_mut().for_each(|row| row[i] = row[i - 1]);
             } else {
-                expand::<CUBIC, N>(plan, record, i, &mut self.weights);
+                expand::<CUBIC, N>(plan, group, record, i, &mut self.weights);
             }
         }
         (self.shape, self.lanes) = (shape, lanes);
     }
 
-    fn set_places<const CUBIC: bool>(&mut self, plan: &RowPlan, record: &Record) {
+    /// Where what is scattered goes.
+    pub(super) fn strands(&mut self) -> &[Strand] {
+        if !self.found {
+            self.strands.find(&self.places);
+            self.found = true;
+        }
+        &self.strands.all
+    }
+
+    fn set_places<const CUBIC: bool>(&mut self, lines: &[Line], first: i16, down: bool) {
         let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
         self.places.clear();
-        for (i, line) in record.lines_of(&plan.lines).iter().enumerate() {
-            let along = i32::from(record.first) + i as i32;
-            for k in 0..taps + i32::from(line.span) {
-                let across = i32::from(line.floor) - before + k;
-                self.places.push(if record.down { [across, along] } else { [along, across] });
-            }
+        for (along, line) in (i32::from(first)..).zip(lines) {
+            let across = i32::from(line.floor) - before;
+            let across = across..across + taps + i32::from(line.span);
+            self.places.extend(across.map(|a| if down { [a, along] } else { [along, a] }));
         }
     }
 }
 
-/// Writes out `record` of `plan` as number `at` of its group.
+/// Writes out `record` of `plan` as number `at` of its `group`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn expand<const CUBIC: bool, const N: usize>(
     plan: &RowPlan,
+    group: &Group,
     record: &Record,
     at: usize,
-    out: &mut [[Lanes; N]],
+    mut out: &mut [[Lanes; N]],
 ) {
     let prepared = Prepared::new::<CUBIC>(record.lanes_of(&plan.lanes));
-    let mut row = 0;
-    for (i, line) in record.lines_of(&plan.lines).iter().enumerate() {
-        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
-        let count = if CUBIC { 4 } else { 2 } + usize::from(line.span);
-        let rows = &mut out[row..];
+    let taps = if CUBIC { 4 } else { 2 };
+    for (number, shared) in (group.first..).zip(group.lines_of(&plan.lines)) {
+        let (rows, rest) = out.split_at_mut(taps + usize::from(shared.span));
+        out = rest;
+        let Some(line) = record.line(number, &plan.lines) else {
+            rows.iter_mut().for_each(|row| row[at] = Lanes::ZERO);
+            continue;
+        };
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, number);
+        let (before, rows) = rows.split_at_mut((line.floor - shared.floor) as usize);
+        let (rows, after) = rows.split_at_mut(taps + usize::from(line.span));
+        before.iter_mut().chain(after).for_each(|row| row[at] = Lanes::ZERO);
         let floor = f32::from(line.floor);
         match line.span {
             0 => level::<CUBIC, N>(&weight, &minor, floor, at, rows),
             1 => one_step::<CUBIC, N>(&weight, &minor, floor, at, rows),
-            _ => steep::<CUBIC, N>(&weight, &minor, floor, count, at, rows),
+            _ => steep::<CUBIC, N>(&weight, &minor, floor, at, rows),
         }
-        row += count;
     }
 }
 
@@ -174,13 +203,12 @@ fn one_step<const CUBIC: bool, const N: usize>(
     }
 }
 
-/// Floors differ by any number; writes the first `count` rows.
+/// Floors differ by any number.
 #[inline(always)]
 fn steep<const CUBIC: bool, const N: usize>(
     weight: &Lanes,
     minor: &Lanes,
     floor: f32,
-    count: usize,
     at: usize,
     rows: &mut [[Lanes; N]],
 ) {
@@ -198,7 +226,7 @@ fn steep<const CUBIC: bool, const N: usize>(
         taps[3].0[i] = weight.0[i] * four[3];
     }
     let first = if CUBIC { 0.0 } else { 1.0 };
-    for k in 0..count {
+    for k in 0..rows.len() {
         // The way out, never taken, keeps the loop over rows a loop over rows: the one within is to be vectorised.
         let Some(row) = rows.get_mut(k).map(|row| &mut row[at]) else { return };
         for i in 0..LANES {

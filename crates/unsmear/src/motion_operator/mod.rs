@@ -18,7 +18,7 @@
 //! The adjoint is the same sum as a scatter, in bands of rows: first every other band, then those between, so that
 //! none writes where another does, in an order that does not depend on the number of threads.
 //!
-//! Units: px. Validity: finite pictures; the major curvature is cut at 0.8 of the major motion, and
+//! Units: px. Validity: finite pictures; the major curvature is cut at 1.8 of the major motion, and
 //! paths of up to 1 px are taken as straight. A constant stays constant; a still pixel is
 //! copied, and so is one of unknown motion (its datum should have no weight). Taps beyond the
 //! padded picture read its edge.
@@ -32,6 +32,8 @@ mod expand;
 mod group;
 mod lanes;
 mod plan;
+mod record;
+mod scatter;
 mod strands;
 mod sweep;
 
@@ -84,7 +86,9 @@ impl MotionOperator {
                 return Err(Error::shape("paths", expected, field.u.shape()));
             }
         }
-        let row = |y| if y > 0 && rows_agree(paths, y) { None } else { Some(RowPlan::new(paths, y, taps)) };
+        let row = |y| {
+            if y > 0 && rows_agree(paths, y) { None } else { Some(RowPlan::new(paths, y, taps)) }
+        };
         let own: Vec<Option<RowPlan>> = (0..height).into_par_iter().map(row).collect();
         let mut plans: Vec<Arc<RowPlan>> = Vec::with_capacity(height);
         for plan in own {
@@ -128,8 +132,8 @@ impl MotionOperator {
         LEAST_BAND.max(2 * self.reach)
     }
 
-    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel, after
-    /// x was set to 0.
+    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel; x starts
+    /// as 0. The places of the first phase are all of x, so that it clears them where it is about to write.
     fn for_each_band<D: Send>(
         &self,
         x: &mut [f32],
@@ -138,18 +142,25 @@ impl MotionOperator {
         task: impl Fn(usize, &mut [f32], D) + Sync,
     ) {
         let (stride, band) = (self.width + 2 * pad, self.band());
-        x.par_chunks_mut(stride * ROWS_PER_TASK).for_each(|rows| rows.fill(0.0));
-        let data: Vec<D> = data.collect();
         let (mut even, mut odd) = (Vec::new(), Vec::new());
+        let data: Vec<D> = data.collect();
         for (i, data) in data.into_iter().enumerate() {
-            if i % 2 == 0 { even.push(data) } else { odd.push(data) }
+            if i % 2 == 0 { even.push(Some(data)) } else { odd.push(Some(data)) }
         }
-        for (phase, data) in [even, odd].into_iter().enumerate() {
-            // Band number i writes from `reach` rows above its first to as many below its last.
-            let above = ((pad - self.reach + phase * band) * stride).min(x.len());
-            let places = x[above..].par_chunks_mut(2 * band * stride);
+        // Band number i writes from `reach` rows above its first to as many below its last.
+        let above = (pad - self.reach) * stride;
+        x[..above].fill(0.0);
+        for (phase, mut data) in [even, odd].into_iter().enumerate() {
+            let from = (above + phase * band * stride).min(x.len());
+            let places = x[from..].par_chunks_mut(2 * band * stride);
+            data.resize_with(places.len(), || None);
             places.zip(data).enumerate().for_each(|(i, (place, data))| {
-                task((2 * i + phase) * band, place, data);
+                if phase == 0 {
+                    place.fill(0.0);
+                }
+                if let Some(data) = data {
+                    task((2 * i + phase) * band, place, data);
+                }
             });
         }
     }

@@ -14,11 +14,22 @@
 
 use super::lanes::LANES;
 
-/// One row of products in a strand: its number, and s.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Tap {
-    pub(super) row: u32,
-    pub(super) shift: u32,
+/// One row of products in a strand: its number and s, packed so that a strand fills two lines of the cache at most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tap(u32);
+
+impl Tap {
+    fn new(row: usize, shift: usize) -> Self {
+        Self((row * LANES + shift) as u32)
+    }
+
+    pub(super) fn row(self) -> usize {
+        self.0 as usize / LANES
+    }
+
+    pub(super) fn shift(self) -> usize {
+        self.0 as usize % LANES
+    }
 }
 
 /// Some taps, and where they begin in the picture.
@@ -27,14 +38,14 @@ pub(super) struct Strand {
     /// Least dx, and dy.
     pub(super) place: [i32; 2],
     /// Largest shift.
-    pub(super) range: u32,
-    count: u32,
+    pub(super) range: usize,
+    count: usize,
     taps: [Tap; LANES],
 }
 
 impl Strand {
     pub(super) fn taps(&self) -> &[Tap] {
-        &self.taps[..self.count as usize]
+        &self.taps[..self.count]
     }
 }
 
@@ -59,21 +70,21 @@ impl Strands {
         self.all.clear();
         self.last.clear();
         self.last.resize((most - least + 1) as usize, NONE);
-        for (row, &[dx, dy]) in (0..).zip(places) {
+        for (row, &[dx, dy]) in places.iter().enumerate() {
             let last = &mut self.last[(dy - least) as usize];
             if let Some(strand) = self.all.get_mut(*last as usize) {
-                let shift = (dx - strand.place[0]) as u32;
-                if let Some(tap) = strand.taps.get_mut(strand.count as usize)
-                    && (shift as usize) < LANES
+                let shift = (dx - strand.place[0]) as usize;
+                if let Some(tap) = strand.taps.get_mut(strand.count)
+                    && shift < LANES
                 {
-                    *tap = Tap { row, shift };
+                    *tap = Tap::new(row, shift);
                     strand.range = shift;
                     strand.count += 1;
                     continue;
                 }
             }
             *last = self.all.len() as u32;
-            let taps = [Tap { row, shift: 0 }; LANES];
+            let taps = [Tap::new(row, 0); LANES];
             self.all.push(Strand { place: [dx, dy], range: 0, count: 1, taps });
         }
     }
@@ -90,10 +101,10 @@ mod tests {
         // Found twice: nothing of the first search may be left.
         found.find(&[[5, 5]]);
         found.find(&places);
-        let strands: Vec<([i32; 2], u32, Vec<(u32, u32)>)> = found
+        let strands: Vec<([i32; 2], usize, Vec<(usize, usize)>)> = found
             .all
             .iter()
-            .map(|s| (s.place, s.range, s.taps().iter().map(|t| (t.row, t.shift)).collect()))
+            .map(|s| (s.place, s.range, s.taps().iter().map(|t| (t.row(), t.shift())).collect()))
             .collect();
         let expected = [
             ([-1, 3], 15, vec![(0, 0), (2, 1), (4, 15)]),

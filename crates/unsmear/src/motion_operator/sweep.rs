@@ -10,15 +10,11 @@
 use multiversion::multiversion;
 
 use super::expand::Expanded;
-use super::group::TOGETHER;
+use super::group::{Group, TOGETHER};
 use super::lanes::{LANES, Lanes, Taps};
-use super::plan::{Kind, Record, RowPlan};
-use super::strands::Strand;
-
-/// A row of products of a group, between blocks of zeros.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-struct Products([[f32; LANES]; TOGETHER + 2]);
+use super::plan::RowPlan;
+use super::record::{Kind, Record};
+use super::scatter::{Products, add_strand, product, write_products};
 
 /// Memory of the functions below.
 #[derive(Debug)]
@@ -65,14 +61,14 @@ pub(super) fn gather_row(
     out.fill(0.0);
     scratch.forget();
     let mut rest = &plan.records[..];
-    for &size in &plan.groups {
-        let (records, after) = rest.split_at(size.into());
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
         rest = after;
         if let Some(records) = records.first_chunk::<TOGETHER>() {
-            renew(taps, plan, records, &mut scratch.joint);
+            renew(taps, plan, group, records, &mut scratch.joint);
             take_own(plan, records, &gather(records, &scratch.joint, x), out);
         } else if let Some(records) = records.first_chunk::<1>() {
-            renew(taps, plan, records, &mut scratch.single);
+            renew(taps, plan, group, records, &mut scratch.single);
             take_own(plan, records, &gather(records, &scratch.single, x), out);
         }
     }
@@ -89,17 +85,17 @@ pub(super) fn scatter_row(
 ) {
     scratch.forget();
     let mut rest = &plan.records[..];
-    for &size in &plan.groups {
-        let (records, after) = rest.split_at(size.into());
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
         rest = after;
         if let Some(records) = records.first_chunk::<TOGETHER>() {
-            renew(taps, plan, records, &mut scratch.joint);
+            renew(taps, plan, group, records, &mut scratch.joint);
             let data = records.each_ref().map(|record| lanes_at(r, record));
-            scatter(records, &scratch.joint, &data, &mut scratch.products, x);
+            scatter(records, &mut scratch.joint, &data, &mut scratch.products, x);
         } else if let Some(records) = records.first_chunk::<1>() {
-            renew(taps, plan, records, &mut scratch.single);
+            renew(taps, plan, group, records, &mut scratch.single);
             let data = records.each_ref().map(|record| lanes_at(r, record));
-            scatter(records, &scratch.single, &data, &mut scratch.products, x);
+            scatter(records, &mut scratch.single, &data, &mut scratch.products, x);
         }
     }
 }
@@ -118,17 +114,17 @@ pub(super) fn normal_row(
     b.fill(0.0);
     scratch.forget();
     let mut rest = &plan.records[..];
-    for &size in &plan.groups {
-        let (records, after) = rest.split_at(size.into());
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
         rest = after;
         if let Some(records) = records.first_chunk::<TOGETHER>() {
-            renew(taps, plan, records, &mut scratch.joint);
+            renew(taps, plan, group, records, &mut scratch.joint);
             let data = there_and_back(plan, records, &scratch.joint, x, weights, b);
-            scatter(records, &scratch.joint, &data, &mut scratch.products, out);
+            scatter(records, &mut scratch.joint, &data, &mut scratch.products, out);
         } else if let Some(records) = records.first_chunk::<1>() {
-            renew(taps, plan, records, &mut scratch.single);
+            renew(taps, plan, group, records, &mut scratch.single);
             let data = there_and_back(plan, records, &scratch.single, x, weights, b);
-            scatter(records, &scratch.single, &data, &mut scratch.products, out);
+            scatter(records, &mut scratch.single, &data, &mut scratch.products, out);
         }
     }
 }
@@ -156,12 +152,13 @@ fn there_and_back<const N: usize>(
 fn renew<const N: usize>(
     taps: Taps,
     plan: &RowPlan,
+    group: &Group,
     records: &[Record; N],
     rows: &mut Expanded<N>,
 ) {
     match taps {
-        Taps::Cubic => rows.renew::<true>(plan, records),
-        Taps::Linear => rows.renew::<false>(plan, records),
+        Taps::Cubic => rows.renew::<true>(plan, group, records),
+        Taps::Linear => rows.renew::<false>(plan, group, records),
     }
 }
 
@@ -259,82 +256,24 @@ fn add_product<const MIRRORED: bool>(
     out
 }
 
-#[inline(always)]
-fn product(a: &Lanes, b: &Lanes) -> Lanes {
-    let mut out = Lanes::ZERO;
-    for i in 0..LANES {
-        out.0[i] = a.0[i] * b.0[i];
-    }
-    out
-}
-
-/// `sum` + `block`.
-#[inline(always)]
-fn add(sum: &Lanes, block: &[f32; LANES]) -> Lanes {
-    let mut out = Lanes::ZERO;
-    for i in 0..LANES {
-        out.0[i] = sum.0[i] + block[i];
-    }
-    out
-}
-
 /// Adds the weights of the records times their data to `x`.
 #[inline(always)]
 fn scatter<const N: usize>(
     records: &[Record; N],
-    rows: &Expanded<N>,
+    rows: &mut Expanded<N>,
     data: &[Lanes; N],
     products: &mut Vec<Products>,
     x: &mut Window<&mut [f32]>,
 ) {
-    if products.len() < rows.weights.len() {
-        products.resize(rows.weights.len(), Products([[0.0; LANES]; TOGETHER + 2]));
-    }
-    for (weights, products) in rows.weights.iter().zip(&mut *products) {
-        for n in 0..N {
-            products.0[n + 1] = product(&weights[n], &data[n]).0;
-        }
-        products.0[N + 1] = [0.0; LANES];
-    }
+    write_products(&rows.weights, data, products);
     let place = x.place(&records[0]);
-    for strand in &rows.strands.all {
+    for strand in rows.strands() {
         let [dx, dy] = strand.place;
         let delta = dy as isize * x.stride as isize + dx as isize;
         add_strand::<false, N>(products, strand, x.samples, place.wrapping_add_signed(delta));
         if records[0].kind == Kind::Straight {
-            let delta = -delta - strand.range as isize;
-            let place = place.wrapping_add_signed(delta);
+            let place = place.wrapping_add_signed(-delta - strand.range as isize);
             add_strand::<true, N>(products, strand, x.samples, place);
-        }
-    }
-}
-
-/// Adds a strand, or its mirror image, to the samples from `place` on.
-#[inline(always)]
-fn add_strand<const MIRRORED: bool, const N: usize>(
-    products: &[Products],
-    strand: &Strand,
-    x: &mut [f32],
-    place: usize,
-) {
-    let mut sums = [Lanes::ZERO; TOGETHER + 1];
-    for tap in strand.taps() {
-        let shift = if MIRRORED { strand.range - tap.shift } else { tap.shift } as usize;
-        let from = &products[tap.row as usize].0.as_flattened()[LANES - shift..];
-        let from = &from[..(N + 1) * LANES].as_chunks().0[..=N];
-        for n in 0..=N {
-            sums[n] = add(&sums[n], &from[n]);
-        }
-    }
-    let x = &mut x[place..];
-    if let Some((to, _)) = x.split_at_mut_checked((N + 1) * LANES) {
-        for (to, sum) in to.as_chunks_mut().0.iter_mut().zip(&sums) {
-            *to = add(sum, to).0;
-        }
-    } else {
-        // What lies beyond the picture are the zeros after the last product.
-        for (to, sum) in x.iter_mut().zip(sums.iter().flat_map(|sum| sum.0)) {
-            *to += sum;
         }
     }
 }
