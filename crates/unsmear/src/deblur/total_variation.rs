@@ -209,7 +209,7 @@ fn short_blur_gain(looks: &[Look<'_>]) -> f64 {
     for look in looks {
         let velocity = &look.paths.velocity;
         for (u, v) in velocity.u.iter().zip(&velocity.v) {
-            let length = u.hypot(*v);
+            let length = (u * u + v * v).sqrt();
             // Unknown motion compares to nothing.
             if length >= STILL {
                 sum += f64::from(length);
