@@ -44,7 +44,11 @@
 //! | 16 | `exposure::search` | |
 //! | 17 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
-//! | 12 | [`motion_path`], [`kernel_operator`], `motion_operator::lanes` | parts of the operator; one kernel for the whole picture |
+//! | 3 | `motion_operator::lanes` | arithmetic of pixels side by side |
+//! | 4 | `motion_operator::record`, `motion_operator::strands` | |
+//! | 5 | `motion_operator::group` | |
+//! | 6 | `motion_operator::scatter` | |
+//! | 12 | [`motion_path`], [`kernel_operator`] | paths; one kernel for the whole picture |
 //! | 13 | `motion_operator::plan` | |
 //! | 14 | `motion_operator::expand` | |
 //! | 15 | `motion_operator::sweep` | |

@@ -50,3 +50,37 @@ pub trait LinearOperator: Sync {
         self.adjoint(&weighted, out);
     }
 }
+
+/// What the tests of all operators need.
+#[cfg(test)]
+pub(crate) mod trials {
+    use super::LinearOperator;
+
+    /// Numbers in [-1, 1).
+    pub(crate) fn noise(count: usize, seed: u64) -> Vec<f32> {
+        let mut state = seed;
+        let step = |_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+        };
+        (0..count).map(step).collect()
+    }
+
+    pub(crate) fn dot(a: &[f32], b: &[f32]) -> f64 {
+        a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum()
+    }
+
+    /// `|<A x, r> - <x, A^T r>|` over `|A x| |r|` (the sums themselves may cancel), x and r noise.
+    pub(crate) fn asymmetry(operator: &dyn LinearOperator) -> f64 {
+        let count = |(rows, columns): (usize, usize)| rows * columns;
+        let x = noise(count(operator.unknown_shape()), 2);
+        let r = noise(count(operator.data_shape()), 3);
+        // Nothing that was there may stay.
+        let (mut b, mut back) = (vec![f32::NAN; r.len()], vec![f32::NAN; x.len()]);
+        operator.apply(&x, &mut b);
+        operator.adjoint(&r, &mut back);
+        (dot(&b, &r) - dot(&x, &back)).abs() / (dot(&b, &b) * dot(&r, &r)).sqrt()
+    }
+}

@@ -21,6 +21,7 @@
 //! Units: px; NaN = unknown motion. Validity: paths whose direction turns by less than a right angle.
 
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use crate::array::require_same;
 use crate::error::{Error, Result, require};
@@ -107,15 +108,13 @@ impl MotionPaths {
     /// is clamped.
     #[must_use]
     pub fn reach(&self) -> usize {
-        let planes = |field: &FlowField<f32>| [field.u.clone(), field.v.clone()];
-        let offsets = self.offset.as_ref().map(planes);
+        let parts: [fn(&FlowField<f32>) -> &Array2<f32>; 2] = [|f| &f.u, |f| &f.v];
         let mut longest = 0.0f32;
-        for (axis, (motion, bend)) in
-            planes(&self.velocity).iter().zip(&planes(&self.curvature)).enumerate()
-        {
-            for (i, (&motion, &bend)) in motion.iter().zip(bend).enumerate() {
-                let offset = offsets.as_ref().and_then(|o| o[axis].as_slice()?.get(i).copied());
-                let most = 0.5 * motion.abs() + 0.125 * bend.abs() + offset.unwrap_or(0.0).abs();
+        for part in parts {
+            let mut offsets = self.offset.as_ref().map(|offset| part(offset).iter());
+            for (&motion, &bend) in part(&self.velocity).iter().zip(part(&self.curvature)) {
+                let offset = offsets.as_mut().and_then(Iterator::next).copied().unwrap_or(0.0);
+                let most = 0.5 * motion.abs() + 0.125 * bend.abs() + offset.abs();
                 // A NaN never compares greater.
                 if most > longest {
                     longest = most;
@@ -146,20 +145,14 @@ impl MotionPaths {
         let scaled = |plane: &Array2<f32>| plane.mapv(|z| (exposure * f64::from(z)) as f32);
         let velocity = FlowField::new(scaled(&velocity.u), scaled(&velocity.v))?;
         for (&u, &v) in velocity.u.iter().zip(&velocity.v) {
-            if !(u.is_nan() || v.is_nan()) {
+            let most = f64::from(u.abs() + v.abs());
+            // No vector is longer than its parts together, and most are far from the limit.
+            if most > LONGEST_MOTION {
                 let length = f64::from(u).hypot(f64::from(v));
                 require("velocity", length, "at most 4096 px within the exposure", in_range)?;
             }
         }
-        let view = velocity.view();
-        let mut curvature = FlowField::new(Array2::zeros(view.dim()), Array2::zeros(view.dim()))?;
-        for y in 0..view.dim().0 {
-            for x in 0..view.dim().1 {
-                let [u, v] = advection(&view, y, x);
-                curvature.u[(y, x)] = u;
-                curvature.v[(y, x)] = v;
-            }
-        }
+        let curvature = bends(&velocity.view())?;
         Ok(Self { velocity, curvature, offset: None })
     }
 
@@ -198,6 +191,17 @@ impl MotionPaths {
 
 fn in_range(z: f64) -> bool {
     z.abs() <= LONGEST_MOTION
+}
+
+/// s^2 (v.grad) v of all pixels.
+fn bends(field: &FlowView<'_, f32>) -> Result<FlowField<f32>> {
+    let (mut u, mut v) = (Array2::zeros(field.dim()), Array2::zeros(field.dim()));
+    if let (Some(u), Some(v)) = (u.as_slice_mut(), v.as_slice_mut()) {
+        let width = field.dim().1;
+        let rows = u.par_chunks_mut(width).zip(v.par_chunks_mut(width)).enumerate();
+        rows.for_each(|(y, (u, v))| (0..width).for_each(|x| [u[x], v[x]] = advection(field, y, x)));
+    }
+    FlowField::new(u, v)
 }
 
 /// s^2 (v.grad) v at a pixel; 0 where nothing is known.

@@ -115,7 +115,7 @@ impl MotionDeblur {
             count(|length| f64::from(length) > LONGEST_BLUR),
         ];
         let mut result = MotionResult {
-            images: blurred.channels.iter().map(ArrayView2::to_owned).collect(),
+            images: Vec::new(),
             noise: f64::NAN,
             regularization: f64::NAN,
             iterations: 0,
@@ -124,12 +124,15 @@ impl MotionDeblur {
             copied,
             occluded: 0,
         };
+        let inputs = || blurred.channels.iter().map(ArrayView2::to_owned).collect();
         if copied.iter().sum::<usize>() == shape.0 * shape.1 {
+            result.images = inputs();
             return Ok(result);
         }
         let levels = GreyLevels::of(blurred.channels);
         let planes: Vec<Array2<f32>> = blurred.channels.iter().map(|c| levels.plane(c)).collect();
         let flow = known_flow(&blurred.flow, &lengths)?;
+        drop(lengths);
         let noise = match self.noise {
             Some(noise) => noise * levels.scale(),
             None => measured_noise(&planes, &flow, self.exposure, control)?,
@@ -139,11 +142,15 @@ impl MotionDeblur {
         result.occluded = weights.occluded;
         let acceleration = blurred.acceleration.as_ref().map(single).transpose()?;
         let paths = MotionPaths::new(&flow, self.exposure, acceleration.as_ref())?;
+        // The solve needs the memory more than these, which are quickly made again.
+        drop((flow, acceleration));
         let planes = planes.iter().map(|plane| plane.view()).collect();
         let ceiling = self.ceiling.map(|value| levels.grey(value) as f32);
         let look = Look { paths, planes, weights: weights.used, ceiling };
-        let restored = self.solve(&look, noise, levels.scale(), control)?;
-        let seen = if weights.unknown { Some(seen(&look, restored.pad)?) } else { None };
+        let seen = if weights.unknown { Some(seen(&look)?) } else { None };
+        let restored = self.solve(look, noise, levels.scale(), control)?;
+        result.images = inputs();
+        let lengths = blur_lengths(&blurred.flow, self.exposure);
         compose(&mut result.images, &restored, &lengths, &levels, seen.as_ref());
         let scale = levels.scale();
         result.noise = noise / scale;
@@ -186,32 +193,26 @@ impl MotionDeblur {
         Ok(shape)
     }
 
-    fn solve(
-        &self,
-        look: &Look<'_>,
-        noise: f64,
-        scale: f64,
-        control: &Control,
-    ) -> Result<Restored> {
+    fn solve(&self, look: Look<'_>, noise: f64, scale: f64, control: &Control) -> Result<Restored> {
         match self.method {
             MotionMethod::TotalVariation(effort) => {
                 let lambda = self.regularization.map(|lambda| lambda * scale);
-                let looks = std::slice::from_ref(look);
-                TotalVariation { noise, lambda, effort }.restore(looks, control)
+                TotalVariation { noise, lambda, effort }.restore(vec![look], control)
             }
             MotionMethod::Tikhonov => {
                 let lambda = self.regularization;
-                Tikhonov { noise, lambda }.restore(look, control)
+                Tikhonov { noise, lambda }.restore(&look, control)
             }
             MotionMethod::RichardsonLucy => {
-                RichardsonLucy { noise, ..RichardsonLucy::default() }.restore(look, control)
+                RichardsonLucy { noise, ..RichardsonLucy::default() }.restore(&look, control)
             }
         }
     }
 }
 
 /// Share of the light of each pixel that fell on known samples, of the picture's shape.
-fn seen(look: &Look<'_>, pad: usize) -> Result<Array2<f32>> {
+fn seen(look: &Look<'_>) -> Result<Array2<f32>> {
+    let pad = look.paths.reach();
     let operator = MotionOperator::new(&look.paths, Taps::Linear, pad)?;
     let known = |at: (usize, usize)| look.planes.iter().all(|plane| plane[at].is_finite());
     let (height, width) = operator.data_shape();

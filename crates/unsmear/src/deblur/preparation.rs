@@ -12,9 +12,10 @@ use crate::real::Real;
 
 /// Blur of each pixel, px; NaN where the motion is unknown.
 pub(super) fn blur_lengths<T: Real>(flow: &FlowView<'_, T>, exposure: f64) -> Array2<f32> {
-    Zip::from(&flow.u)
-        .and(&flow.v)
-        .map_collect(|u, v| (exposure * u.as_f64().hypot(v.as_f64())) as f32)
+    Zip::from(&flow.u).and(&flow.v).map_collect(|u, v| {
+        let (u, v) = (u.as_f64(), v.as_f64());
+        (exposure * (u * u + v * v).sqrt()) as f32
+    })
 }
 
 /// The flow in single precision; unknown where the blur is beyond [`LONGEST_BLUR`].

@@ -14,11 +14,10 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::vectors::block_dot;
+
 /// Rows per task; a row's sum is its own, so that this does not show in results.
 const ROWS_PER_TASK: usize = 8;
-
-/// Independent partial sums of a row.
-const LANES: usize = 32;
 
 /// Weights of the differences of each pixel: three packed planes.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +76,7 @@ impl Smoothness {
                     rows.mixed[2] = &last;
                 }
                 row_gradient(&rows, lambda, q);
-                row_dot(rows.p[1], q)
+                block_dot(rows.p[1], q)
             })
             .collect();
         sums.iter().sum()
@@ -147,22 +146,6 @@ fn interior(
             - mu[x] * (ae[x] - aw[x]);
         q[x] -= lambda * (0.5 * flux + 0.25 * mixed);
     }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn row_dot(a: &[f32], b: &[f32]) -> f64 {
-    let mut sums = [0.0f32; LANES];
-    let whole = a.len() / LANES * LANES;
-    for start in (0..whole).step_by(LANES) {
-        let (a, b) = (&a[start..start + LANES], &b[start..start + LANES]);
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    for i in whole..a.len() {
-        sums[i - whole] += a[i] * b[i];
-    }
-    sums.iter().map(|&lane| f64::from(lane)).sum()
 }
 
 #[cfg(test)]

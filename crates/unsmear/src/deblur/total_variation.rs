@@ -116,12 +116,18 @@ pub struct Restored {
 }
 
 impl TotalVariation {
-    /// Restores the one picture that all `looks` show.
+    /// Restores the one picture that all `looks` show. Looks that are given away (a `Vec`) are gone before the long
+    /// solve: it has no use for paths.
     ///
     /// # Errors
     /// [`Error::Value`] without looks or for parameters out of range; [`Error::Shape`] for shapes that differ;
     /// [`Error::Cancelled`].
-    pub fn restore(&self, looks: &[Look<'_>], control: &Control) -> Result<Restored> {
+    pub fn restore<'a>(
+        &self,
+        given: impl AsRef<[Look<'a>]>,
+        control: &Control,
+    ) -> Result<Restored> {
+        let looks = given.as_ref();
         let Some(channels) = looks.first().map(|look| look.planes.len()) else {
             return Err(Error::value("looks", "at least one", 0));
         };
@@ -132,6 +138,7 @@ impl TotalVariation {
         let (operators, pad) = operators(looks, Taps::Cubic)?;
         let start = self.half_size(looks, &operators[0], lambda, control)?;
         let data = data(looks, &operators)?;
+        drop(given);
         let (turns, steps) = self.effort.full;
         let first = stage(PRIOR, lambda, (1, steps));
         let mut solution = first.solve(&data, Some(start), control)?;
@@ -202,7 +209,7 @@ fn short_blur_gain(looks: &[Look<'_>]) -> f64 {
     for look in looks {
         let velocity = &look.paths.velocity;
         for (u, v) in velocity.u.iter().zip(&velocity.v) {
-            let length = u.hypot(*v);
+            let length = (u * u + v * v).sqrt();
             // Unknown motion compares to nothing.
             if length >= STILL {
                 sum += f64::from(length);

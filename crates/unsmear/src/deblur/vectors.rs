@@ -56,8 +56,9 @@ fn total(lanes: &[f32; LANES]) -> f64 {
     lanes.iter().map(|&lane| f64::from(lane)).sum()
 }
 
+/// Inner product of one block, or of one row of a picture.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn block_dot(a: &[f32], b: &[f32]) -> f64 {
+pub(super) fn block_dot(a: &[f32], b: &[f32]) -> f64 {
     let mut sums = [0.0f32; LANES];
     let whole = a.len() / LANES * LANES;
     for start in (0..whole).step_by(LANES) {

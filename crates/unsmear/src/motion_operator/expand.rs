@@ -6,76 +6,147 @@
 
 use multiversion::multiversion;
 
+use super::group::Group;
 use super::lanes::{LANES, Lanes, Prepared, four_taps};
-use super::plan::{Kind, Record, RowPlan, line_of};
+use super::plan::{RowPlan, line_of};
+use super::record::{Kind, Line, Record};
+use super::strands::{Strand, Strands};
 
 /// Added and subtracted, rounds to a whole number whatever is far smaller: 3/2 2^23.
 const WHOLE: f32 = 12_582_912.0;
 
-/// The rows of weights of one record.
-#[derive(Debug, Default)]
-pub(super) struct Expanded {
-    /// 16 weights each.
-    pub(super) weights: Vec<Lanes>,
-    /// What they weigh begins so many samples after the record's first pixel.
-    pub(super) deltas: Vec<i32>,
-    /// Rows in use.
-    pub(super) count: usize,
+/// The rows of weights of `N` records that are swept as one.
+#[derive(Debug)]
+pub(super) struct Expanded<const N: usize> {
+    /// 16 weights of each record.
+    pub(super) weights: Vec<[Lanes; N]>,
+    /// What they weigh begins so many samples to the right of a record's first pixel and so many below.
+    pub(super) places: Vec<[i32; 2]>,
+    /// Where what is scattered goes, if they were found for these places.
+    strands: Strands,
+    found: bool,
+    /// The records' lanes that the weights are made from.
+    lanes: Option<[u32; N]>,
+    /// First line, lines and axis that the places are made from.
+    shape: Option<(i16, u32, bool)>,
 }
 
-impl Expanded {
-    /// Makes room for `rows` rows.
-    fn reserve(&mut self, rows: usize) {
-        if self.weights.len() < rows {
-            self.weights.resize(rows, Lanes::ZERO);
-            self.deltas.resize(rows, 0);
+impl<const N: usize> Expanded<N> {
+    pub(super) fn new() -> Self {
+        let (weights, places) = (Vec::new(), Vec::new());
+        Self {
+            weights,
+            places,
+            strands: Strands::default(),
+            found: false,
+            lanes: None,
+            shape: None,
         }
-        self.count = rows;
+    }
+
+    /// Forgets what is written out: another row's plan follows.
+    pub(super) fn forget(&mut self) {
+        (self.lanes, self.shape, self.found) = (None, None, false);
+    }
+
+    /// Writes out the `records` of a `group` of `plan`, unless that is what was written out last.
+    pub(super) fn renew<const CUBIC: bool>(
+        &mut self,
+        plan: &RowPlan,
+        group: &Group,
+        records: &[Record; N],
+    ) {
+        let lead = &records[0];
+        if lead.kind == Kind::Still {
+            self.forget();
+            self.weights.resize(1, [Lanes::ZERO; N]);
+            self.weights[0] = records.map(|record| record.lanes_of(&plan.lanes)[0]);
+            self.places.splice(.., [[0, 0]]);
+            return;
+        }
+        let shape = Some((group.first, group.lines, lead.down));
+        let lanes = Some(records.map(|record| record.lanes));
+        if self.shape == shape && self.lanes == lanes {
+            return;
+        }
+        if self.shape != shape {
+            self.weights.resize(group.rows as usize, [Lanes::ZERO; N]);
+            self.set_places::<CUBIC>(group.lines_of(&plan.lines), group.first, lead.down);
+            self.found = false;
+        }
+        for (i, record) in records.iter().enumerate() {
+            if i > 0 && record.lanes == records[i - 1].lanes {
+                self.weights.iter_mut().for_each(|row| row[i] = row[i - 1]);
+            } else {
+                expand::<CUBIC, N>(plan, group, record, i, &mut self.weights);
+            }
+        }
+        (self.shape, self.lanes) = (shape, lanes);
+    }
+
+    /// Where what is scattered goes.
+    pub(super) fn strands(&mut self) -> &[Strand] {
+        if !self.found {
+            self.strands.find(&self.places);
+            self.found = true;
+        }
+        &self.strands.all
+    }
+
+    fn set_places<const CUBIC: bool>(&mut self, lines: &[Line], first: i16, down: bool) {
+        let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
+        self.places.clear();
+        for (along, line) in (i32::from(first)..).zip(lines) {
+            let across = i32::from(line.floor) - before;
+            let across = across..across + taps + i32::from(line.span);
+            self.places.extend(across.map(|a| if down { [a, along] } else { [along, a] }));
+        }
     }
 }
 
-/// Writes out `record` of `plan` for a picture of rows of `stride` samples.
+/// Writes out `record` of `plan` as number `at` of its `group`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn expand<const CUBIC: bool>(
+fn expand<const CUBIC: bool, const N: usize>(
     plan: &RowPlan,
+    group: &Group,
     record: &Record,
-    stride: i32,
-    out: &mut Expanded,
+    at: usize,
+    mut out: &mut [[Lanes; N]],
 ) {
-    out.reserve(record.rows as usize);
-    let lanes = record.lanes_of(&plan.lanes);
-    if record.kind == Kind::Still {
-        (out.weights[0], out.deltas[0]) = (lanes[0], 0);
-        return;
-    }
-    let (along, across) = if record.down { (stride, 1) } else { (1, stride) };
-    let lines = &plan.lines[record.lines as usize..][..usize::from(record.count)];
-    let prepared = Prepared::new::<CUBIC>(lanes);
-    let mut row = 0;
-    for (i, line) in lines.iter().enumerate() {
-        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
-        let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
-        let count = taps + usize::from(line.span);
-        let rows = &mut out.weights[row..];
+    let prepared = Prepared::new::<CUBIC>(record.lanes_of(&plan.lanes));
+    let taps = if CUBIC { 4 } else { 2 };
+    for (number, shared) in (group.first..).zip(group.lines_of(&plan.lines)) {
+        let (rows, rest) = out.split_at_mut(taps + usize::from(shared.span));
+        out = rest;
+        let Some(line) = record.line(number, &plan.lines) else {
+            rows.iter_mut().for_each(|row| row[at] = Lanes::ZERO);
+            continue;
+        };
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, number);
+        let (before, rows) = rows.split_at_mut((line.floor - shared.floor) as usize);
+        let (rows, after) = rows.split_at_mut(taps + usize::from(line.span));
+        before.iter_mut().chain(after).for_each(|row| row[at] = Lanes::ZERO);
         let floor = f32::from(line.floor);
         match line.span {
-            0 => level::<CUBIC>(&weight, &minor, floor, rows),
-            1 => one_step::<CUBIC>(&weight, &minor, floor, rows),
-            _ => steep::<CUBIC>(&weight, &minor, floor, count, rows),
+            0 => level::<CUBIC, N>(&weight, &minor, floor, at, rows),
+            1 => one_step::<CUBIC, N>(&weight, &minor, floor, at, rows),
+            _ => steep::<CUBIC, N>(&weight, &minor, floor, at, rows),
         }
-        let first = (i32::from(record.first) + i as i32) * along;
-        for (k, delta) in out.deltas[row..row + count].iter_mut().enumerate() {
-            *delta = first + (i32::from(line.floor) - before + k as i32) * across;
-        }
-        row += count;
     }
 }
 
 /// All floors are `floor`.
 #[inline(always)]
-fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mut [Lanes]) {
+fn level<const CUBIC: bool, const N: usize>(
+    weight: &Lanes,
+    minor: &Lanes,
+    floor: f32,
+    at: usize,
+    rows: &mut [[Lanes; N]],
+) {
     if CUBIC {
         let [r0, r1, r2, r3, ..] = rows else { return };
+        let [r0, r1, r2, r3] = [r0, r1, r2, r3].map(|row| &mut row[at]);
         for i in 0..LANES {
             let taps = four_taps::<CUBIC>(minor.0[i] - floor);
             r0.0[i] = weight.0[i] * taps[0];
@@ -85,6 +156,7 @@ fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mu
         }
     } else {
         let [r0, r1, ..] = rows else { return };
+        let [r0, r1] = [r0, r1].map(|row| &mut row[at]);
         for i in 0..LANES {
             let taps = four_taps::<CUBIC>(minor.0[i] - floor);
             r0.0[i] = weight.0[i] * taps[1];
@@ -95,9 +167,16 @@ fn level<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mu
 
 /// Floors are `floor` or the next.
 #[inline(always)]
-fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: &mut [Lanes]) {
+fn one_step<const CUBIC: bool, const N: usize>(
+    weight: &Lanes,
+    minor: &Lanes,
+    floor: f32,
+    at: usize,
+    rows: &mut [[Lanes; N]],
+) {
     if CUBIC {
         let [r0, r1, r2, r3, r4, ..] = rows else { return };
+        let [r0, r1, r2, r3, r4] = [r0, r1, r2, r3, r4].map(|row| &mut row[at]);
         for i in 0..LANES {
             let f = minor.0[i] - floor;
             let up = f >= 1.0;
@@ -111,6 +190,7 @@ fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: 
         }
     } else {
         let [r0, r1, r2, ..] = rows else { return };
+        let [r0, r1, r2] = [r0, r1, r2].map(|row| &mut row[at]);
         for i in 0..LANES {
             let f = minor.0[i] - floor;
             let up = f >= 1.0;
@@ -123,14 +203,14 @@ fn one_step<const CUBIC: bool>(weight: &Lanes, minor: &Lanes, floor: f32, rows: 
     }
 }
 
-/// Floors differ by any number; writes the first `count` rows.
+/// Floors differ by any number.
 #[inline(always)]
-fn steep<const CUBIC: bool>(
+fn steep<const CUBIC: bool, const N: usize>(
     weight: &Lanes,
     minor: &Lanes,
     floor: f32,
-    count: usize,
-    rows: &mut [Lanes],
+    at: usize,
+    rows: &mut [[Lanes; N]],
 ) {
     let (mut taps, mut up) = ([Lanes::ZERO; 4], Lanes::ZERO);
     for i in 0..LANES {
@@ -146,9 +226,9 @@ fn steep<const CUBIC: bool>(
         taps[3].0[i] = weight.0[i] * four[3];
     }
     let first = if CUBIC { 0.0 } else { 1.0 };
-    for k in 0..count {
+    for k in 0..rows.len() {
         // The way out, never taken, keeps the loop over rows a loop over rows: the one within is to be vectorised.
-        let Some(row) = rows.get_mut(k) else { return };
+        let Some(row) = rows.get_mut(k).map(|row| &mut row[at]) else { return };
         for i in 0..LANES {
             let tap = k as f32 + first - up.0[i];
             let low = if tap == 0.0 { taps[0].0[i] } else { 0.0 };

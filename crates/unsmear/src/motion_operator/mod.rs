@@ -18,7 +18,7 @@
 //! The adjoint is the same sum as a scatter, in bands of rows: first every other band, then those between, so that
 //! none writes where another does, in an order that does not depend on the number of threads.
 //!
-//! Units: px. Validity: finite pictures; the major curvature is cut at 0.8 of the major motion, and
+//! Units: px. Validity: finite pictures; the major curvature is cut at 1.8 of the major motion, and
 //! paths of up to 1 px are taken as straight. A constant stays constant; a still pixel is
 //! copied, and so is one of unknown motion (its datum should have no weight). Taps beyond the
 //! padded picture read its edge.
@@ -29,9 +29,15 @@
 //! [10.1109/TASSP.1981.1163711](https://doi.org/10.1109/TASSP.1981.1163711).
 
 mod expand;
+mod group;
 mod lanes;
 mod plan;
+mod record;
+mod scatter;
+mod strands;
 mod sweep;
+
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -40,21 +46,23 @@ use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
 use lanes::LANES;
 use plan::RowPlan;
-use sweep::{Scratch, gather_row, normal_row, scatter_row};
+use sweep::{Scratch, Window, gather_row, normal_row, scatter_row};
 
 pub use lanes::Taps;
 
 /// Rows gathered per task.
 const ROWS_PER_TASK: usize = 8;
-/// Rows of data scattered per task, at least: some 2 ms of work on a wide picture.
-const LEAST_BAND: usize = 64;
+/// Rows of data scattered per task, at least: half a millisecond of work on a wide picture, and several tasks per thread
+/// on a low one.
+const LEAST_BAND: usize = 32;
 
 /// The blur of [`MotionPaths`]; see the [module](self).
 ///
 /// Holds 12 (straight paths) to 30 bytes per pixel.
 #[derive(Debug, Clone)]
 pub struct MotionOperator {
-    plans: Vec<RowPlan>,
+    /// Of every row; rows of equal paths share theirs.
+    plans: Vec<Arc<RowPlan>>,
     width: usize,
     taps: Taps,
     pad: usize,
@@ -78,8 +86,14 @@ impl MotionOperator {
                 return Err(Error::shape("paths", expected, field.u.shape()));
             }
         }
-        let row = |y| RowPlan::new(paths, y, taps);
-        let plans: Vec<RowPlan> = (0..height).into_par_iter().map(row).collect();
+        let row = |y| {
+            if y > 0 && rows_agree(paths, y) { None } else { Some(RowPlan::new(paths, y, taps)) }
+        };
+        let own: Vec<Option<RowPlan>> = (0..height).into_par_iter().map(row).collect();
+        let mut plans: Vec<Arc<RowPlan>> = Vec::with_capacity(height);
+        for plan in own {
+            plans.extend(plan.map(Arc::new).or_else(|| plans.last().cloned()));
+        }
         // A block wider than the picture writes zeros beyond it.
         let beyond = LANES.saturating_sub(width);
         let reach = plans.iter().map(|plan| plan.reach).max().unwrap_or(0) + beyond;
@@ -90,11 +104,11 @@ impl MotionOperator {
     fn gather(&self, x: &[f32], pad: usize, b: &mut [f32]) {
         let stride = self.width + 2 * pad;
         b.par_chunks_mut(self.width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
             for (i, out) in rows.chunks_mut(self.width).enumerate() {
                 let y = task * ROWS_PER_TASK + i;
-                let (plan, start) = (&self.plans[y], (y + pad) * stride + pad);
-                gather_row(plan, self.taps, x, stride, start, out, &mut scratch);
+                let x = Window { samples: x, stride, start: (y + pad) * stride + pad };
+                gather_row(&self.plans[y], self.taps, &x, out, &mut scratch);
             }
         });
     }
@@ -104,10 +118,11 @@ impl MotionOperator {
         let stride = self.width + 2 * pad;
         let rows = r.par_chunks(self.width * self.band());
         self.for_each_band(x, pad, rows, |y, place, rows| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
+            let mut x = Window { samples: place, stride, start: self.reach * stride + pad };
             for (i, row) in rows.chunks(self.width).enumerate() {
-                let (plan, start) = (&self.plans[y + i], (i + self.reach) * stride + pad);
-                scatter_row(plan, self.taps, row, stride, start, place, &mut scratch);
+                scatter_row(&self.plans[y + i], self.taps, row, &mut x, &mut scratch);
+                x.start += stride;
             }
         });
     }
@@ -117,8 +132,8 @@ impl MotionOperator {
         LEAST_BAND.max(2 * self.reach)
     }
 
-    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel, after
-    /// x was set to 0.
+    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel; x starts
+    /// as 0. The places of the first phase are all of x, so that it clears them where it is about to write.
     fn for_each_band<D: Send>(
         &self,
         x: &mut [f32],
@@ -127,18 +142,25 @@ impl MotionOperator {
         task: impl Fn(usize, &mut [f32], D) + Sync,
     ) {
         let (stride, band) = (self.width + 2 * pad, self.band());
-        x.par_chunks_mut(stride * ROWS_PER_TASK).for_each(|rows| rows.fill(0.0));
-        let data: Vec<D> = data.collect();
         let (mut even, mut odd) = (Vec::new(), Vec::new());
+        let data: Vec<D> = data.collect();
         for (i, data) in data.into_iter().enumerate() {
-            if i % 2 == 0 { even.push(data) } else { odd.push(data) }
+            if i % 2 == 0 { even.push(Some(data)) } else { odd.push(Some(data)) }
         }
-        for (phase, data) in [even, odd].into_iter().enumerate() {
-            // Band number i writes from `reach` rows above its first to as many below its last.
-            let above = ((pad - self.reach + phase * band) * stride).min(x.len());
-            let places = x[above..].par_chunks_mut(2 * band * stride);
+        // Band number i writes from `reach` rows above its first to as many below its last.
+        let above = (pad - self.reach) * stride;
+        x[..above].fill(0.0);
+        for (phase, mut data) in [even, odd].into_iter().enumerate() {
+            let from = (above + phase * band * stride).min(x.len());
+            let places = x[from..].par_chunks_mut(2 * band * stride);
+            data.resize_with(places.len(), || None);
             places.zip(data).enumerate().for_each(|(i, (place, data))| {
-                task((2 * i + phase) * band, place, data);
+                if phase == 0 {
+                    place.fill(0.0);
+                }
+                if let Some(data) = data {
+                    task((2 * i + phase) * band, place, data);
+                }
             });
         }
     }
@@ -215,15 +237,26 @@ impl LinearOperator for MotionOperator {
         let (pad, chunk) = (self.pad, self.width * self.band());
         let data = b.par_chunks_mut(chunk).zip(weights.par_chunks(chunk));
         self.for_each_band(out, pad, data, |y, place, (b, weights)| {
-            let mut scratch = Scratch::default();
+            let mut scratch = Scratch::new();
+            let mut x = Window { samples: x, stride: columns, start: (y + pad) * columns + pad };
+            let start = self.reach * columns + pad;
+            let mut out = Window { samples: place, stride: columns, start };
             let pairs = b.chunks_mut(self.width).zip(weights.chunks(self.width));
             for (i, (b, weights)) in pairs.enumerate() {
-                let (from, to) = ((y + i + pad) * columns + pad, (i + self.reach) * columns + pad);
-                let (plan, scratch) = (&self.plans[y + i], &mut scratch);
-                normal_row(plan, self.taps, x, weights, columns, from, b, place, to, scratch);
+                normal_row(&self.plans[y + i], self.taps, &x, weights, b, &mut out, &mut scratch);
+                x.start += columns;
+                out.start += columns;
             }
         });
     }
+}
+
+/// Whether row `y` has the paths of the row above, bit for bit.
+fn rows_agree(paths: &MotionPaths, y: usize) -> bool {
+    let fields = [&paths.velocity, &paths.curvature].into_iter().chain(&paths.offset);
+    fields.flat_map(|field| [&field.u, &field.v]).all(|plane| {
+        plane.row(y).iter().zip(plane.row(y - 1)).all(|(a, b)| a.to_bits() == b.to_bits())
+    })
 }
 
 #[cfg(test)]

@@ -10,7 +10,9 @@
 
 use multiversion::multiversion;
 
+use super::group::{Group, group};
 use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
+use super::record::{Kind, Line, Record};
 use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 
@@ -20,61 +22,16 @@ const STRAIGHT: f32 = 0.1;
 const LEAST_MOTION: f32 = 0.02;
 /// Longest major motion, px, that is always straight.
 const SHORT: f32 = 1.0;
-/// Largest major curvature as a share of the major motion: at 2 the path would turn back.
-const MOST_BEND: f32 = 0.8;
-
-/// How the pixels of a record move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// Not at all. Lanes: whether the pixel is meant, 1 or 0.
-    Still,
-    /// Straight through themselves. Lanes: gain, a, b.
-    Straight,
-    /// On parabolas of little change of speed. Lanes: gain, a, b, q_a, q_b and, if there are offsets, d_a, d_b.
-    Gentle,
-    /// On any parabolas. Lanes: the same.
-    Curved,
-}
-
-/// One block of one row on one axis.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Record {
-    /// First column.
-    pub(super) column: u32,
-    pub(super) kind: Kind,
-    /// Whether the major axis is the vertical one.
-    pub(super) down: bool,
-    /// First line and number of lines; a straight record has those from 0 on and is also meant mirrored.
-    pub(super) first: i16,
-    pub(super) count: u16,
-    /// Lines from the first to the second, exclusive, lie between the ends of all paths.
-    pub(super) inner: [i16; 2],
-    /// Where its lines and lanes begin in the row's.
-    pub(super) lines: u32,
-    pub(super) lanes: u32,
-    pub(super) planes: u8,
-    /// Rows of weights it makes.
-    pub(super) rows: u32,
-}
-
-impl Record {
-    /// Its lanes out of those of its row.
-    pub(super) fn lanes_of<'a>(&self, lanes: &'a [Lanes]) -> &'a [Lanes] {
-        &lanes[self.lanes as usize..][..usize::from(self.planes)]
-    }
-}
-
-/// Minor positions of a block on one line: the floor of the least, and how much greater that of the greatest is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
-    pub(super) floor: i16,
-    pub(super) span: u16,
-}
+/// Largest major curvature as a share of the major motion: the slow end has a tenth of the mean speed. At 2 the path
+/// would turn back.
+const MOST_BEND: f32 = 1.8;
 
 /// All records of a row of pixels.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RowPlan {
     pub(super) records: Vec<Record>,
+    /// Which of them, in this order, are swept as one; see `group.rs`.
+    pub(super) groups: Vec<Group>,
     pub(super) lines: Vec<Line>,
     pub(super) lanes: Vec<Lanes>,
     /// Rows or columns from a pixel to what it reads, at most.
@@ -106,13 +63,15 @@ impl RowPlan {
             }
             if still != Lanes::ZERO {
                 let record = plan.record(column, Kind::Still, false);
-                plan.records.push(Record { rows: 1, ..record });
+                plan.records.push(record);
                 plan.lanes.push(still);
             }
             for (block, down) in moving.iter().zip([false, true]) {
                 plan.push_block(column, block, down, taps);
             }
         }
+        plan.groups = group(&mut plan.records, &mut plan.lines, 2 * taps.reach() as u32);
+        plan.groups.shrink_to_fit();
         plan.records.shrink_to_fit();
         plan.lines.shrink_to_fit();
         plan.lanes.shrink_to_fit();
@@ -131,7 +90,6 @@ impl RowPlan {
             lines: self.lines.len() as u32,
             lanes: self.lanes.len() as u32,
             planes: 1,
-            rows: 0,
         }
     }
 
@@ -167,8 +125,6 @@ impl RowPlan {
         for (gain, sum) in self.lanes[record.lanes as usize].0.iter_mut().zip(sums.0) {
             *gain = if *gain > 0.0 { 1.0 / sum } else { 0.0 };
         }
-        let rows = |line: &Line| u32::from(line.span) + 2 * taps.reach() as u32;
-        record.rows = self.lines[before..].iter().map(rows).sum();
         let ends = [record.first, record.first + record.count as i16 - 1];
         let across = self.lines[before..].iter().flat_map(|line| {
             let last = i32::from(line.floor) + i32::from(line.span) + 2;
@@ -176,7 +132,19 @@ impl RowPlan {
         });
         let farthest = across.chain(ends.map(i32::from)).map(i32::unsigned_abs).max();
         self.reach = self.reach.max(farthest.map_or(0, |z| z as usize));
+        self.share(&mut record);
         self.records.push(record);
+    }
+
+    /// Lets a record whose lanes are those of the one before, and hence its lines, use them.
+    fn share(&mut self, record: &mut Record) {
+        let alike = |last: &&Record| last.kind == record.kind && last.planes == record.planes;
+        let Some(last) = self.records.last().filter(alike) else { return };
+        if last.lanes_of(&self.lanes) == record.lanes_of(&self.lanes) {
+            self.lanes.truncate(record.lanes as usize);
+            self.lines.truncate(record.lines as usize);
+            (record.lanes, record.lines) = (last.lanes, last.lines);
+        }
     }
 }
 
@@ -224,7 +192,7 @@ fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<L
     let mut sums = Lanes::ZERO;
     let prepared = Prepared::new::<CUBIC>(lanes);
     for i in 0..record.count {
-        let [weight, minor] = line_of::<CUBIC>(record, &prepared, i as i16);
+        let [weight, minor] = line_of::<CUBIC>(record, &prepared, record.first + i as i16);
         let twice = if record.kind == Kind::Straight { 2.0 } else { 1.0 };
         let (mut least, mut most) = (minor.0[0], minor.0[0]);
         for lane in 0..LANES {
@@ -238,10 +206,13 @@ fn survey<const CUBIC: bool>(record: &Record, lanes: &[Lanes], lines: &mut Vec<L
     sums
 }
 
-/// Weights and minor positions of the pixels on the line number `i` of a record that moves.
+/// Weights and minor positions of the pixels of a record that moves on one of its lines.
 #[inline(always)]
-pub(super) fn line_of<const CUBIC: bool>(record: &Record, paths: &Prepared, i: i16) -> [Lanes; 2] {
-    let line = record.first + i;
+pub(super) fn line_of<const CUBIC: bool>(
+    record: &Record,
+    paths: &Prepared,
+    line: i16,
+) -> [Lanes; 2] {
     let inner = record.inner[0] <= line && line < record.inner[1];
     let line = f32::from(line);
     match (record.kind, inner) {

@@ -1,98 +1,164 @@
-//! Gather and scatter of one row of data through the rows of weights of its records.
+//! Gather and scatter of one row of data through the rows of weights of its groups of records.
 //!
 //! ```text
 //! b[c + i] = sum_k w_k[i] x[s + delta_k + i],      x[s + delta_k + i] += w_k[i] r[c + i]
 //! ```
 //!
-//! with s the place of pixel c in x; of straight records also at s - delta_k. The scatter takes several records at a
-//! time, one row of each in turn: writes to overlapping places follow each other only after all of those.
+//! with s the place of pixel c in x; of straight records also at s - delta_k. The gather keeps the sums of a group in
+//! registers; the scatter writes the products w_k r down side by side and adds them up by strands.
 
 use multiversion::multiversion;
 
-use super::expand::{Expanded, expand};
+use super::expand::Expanded;
+use super::group::{Group, TOGETHER};
 use super::lanes::{LANES, Lanes, Taps};
-use super::plan::{Kind, Record, RowPlan};
+use super::plan::RowPlan;
+use super::record::{Kind, Record};
+use super::scatter::{Products, add_strand, product, write_products};
 
-/// Records scattered together: a write that a later read overlaps has by then left the processor's queue
-/// of writes, and the weights (5 kB each for 15 px) stay in the first-level cache.
-pub(super) const TOGETHER: usize = 4;
+/// Memory of the functions below.
+#[derive(Debug)]
+pub(super) struct Scratch {
+    joint: Expanded<TOGETHER>,
+    single: Expanded<1>,
+    products: Vec<Products>,
+}
 
-/// Memory of [`gather_row`] and [`scatter_row`].
-pub(super) type Scratch = [Expanded; TOGETHER];
+impl Scratch {
+    pub(super) fn new() -> Self {
+        Self { joint: Expanded::new(), single: Expanded::new(), products: Vec::new() }
+    }
 
-/// Writes a row of A x: `x` has rows of `stride` samples, and the row's first pixel is at `start`.
+    fn forget(&mut self) {
+        self.joint.forget();
+        self.single.forget();
+    }
+}
+
+/// Part of a picture with rows of `stride` samples; a row's first pixel is at `start`.
+pub(super) struct Window<P> {
+    pub(super) samples: P,
+    pub(super) stride: usize,
+    pub(super) start: usize,
+}
+
+impl<P> Window<P> {
+    /// Where the first pixel of a record lies.
+    fn place(&self, record: &Record) -> usize {
+        self.start + record.column as usize
+    }
+}
+
+/// Writes a row of A x.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn gather_row(
     plan: &RowPlan,
     taps: Taps,
-    x: &[f32],
-    stride: usize,
-    start: usize,
+    x: &Window<&[f32]>,
     out: &mut [f32],
     scratch: &mut Scratch,
 ) {
     out.fill(0.0);
-    for record in &plan.records {
-        expand_by(taps, plan, record, stride, &mut scratch[0]);
-        let sum = gather(record, &scratch[0], x, start);
-        take_own(plan, record, &sum, out);
+    scratch.forget();
+    let mut rest = &plan.records[..];
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
+        rest = after;
+        if let Some(records) = records.first_chunk::<TOGETHER>() {
+            renew(taps, plan, group, records, &mut scratch.joint);
+            take_own(plan, records, &gather(records, &scratch.joint, x), out);
+        } else if let Some(records) = records.first_chunk::<1>() {
+            renew(taps, plan, group, records, &mut scratch.single);
+            take_own(plan, records, &gather(records, &scratch.single, x), out);
+        }
     }
 }
 
-/// Adds a row of data `r` through A^T to `x`; see [`gather_row`].
+/// Adds a row of data `r` through A^T to `x`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn scatter_row(
     plan: &RowPlan,
     taps: Taps,
     r: &[f32],
-    stride: usize,
-    start: usize,
-    x: &mut [f32],
+    x: &mut Window<&mut [f32]>,
     scratch: &mut Scratch,
 ) {
-    for records in plan.records.chunks(TOGETHER) {
-        let mut data = [Lanes::ZERO; TOGETHER];
-        for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
-            expand_by(taps, plan, record, stride, rows);
-            *data = lanes_at(r, record);
+    scratch.forget();
+    let mut rest = &plan.records[..];
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
+        rest = after;
+        if let Some(records) = records.first_chunk::<TOGETHER>() {
+            renew(taps, plan, group, records, &mut scratch.joint);
+            let data = records.each_ref().map(|record| lanes_at(r, record));
+            scatter(records, &mut scratch.joint, &data, &mut scratch.products, x);
+        } else if let Some(records) = records.first_chunk::<1>() {
+            renew(taps, plan, group, records, &mut scratch.single);
+            let data = records.each_ref().map(|record| lanes_at(r, record));
+            scatter(records, &mut scratch.single, &data, &mut scratch.products, x);
         }
-        scatter(records, scratch, &data, x, start);
     }
 }
 
-/// Writes a row of b = A x and adds A^T (weights b) of it to `out`, in which the row's first pixel is at `place`.
+/// Writes a row of b = A x and adds A^T (weights b) of it to `out`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn normal_row(
     plan: &RowPlan,
     taps: Taps,
-    x: &[f32],
+    x: &Window<&[f32]>,
     weights: &[f32],
-    stride: usize,
-    start: usize,
     b: &mut [f32],
-    out: &mut [f32],
-    place: usize,
+    out: &mut Window<&mut [f32]>,
     scratch: &mut Scratch,
 ) {
     b.fill(0.0);
-    for records in plan.records.chunks(TOGETHER) {
-        let mut data = [Lanes::ZERO; TOGETHER];
-        for ((record, rows), data) in records.iter().zip(scratch.iter_mut()).zip(&mut data) {
-            expand_by(taps, plan, record, stride, rows);
-            let sum = gather(record, rows, x, start);
-            take_own(plan, record, &sum, b);
-            *data = product(&lanes_at(weights, record), &sum);
+    scratch.forget();
+    let mut rest = &plan.records[..];
+    for group in &plan.groups {
+        let (records, after) = rest.split_at(group.size.into());
+        rest = after;
+        if let Some(records) = records.first_chunk::<TOGETHER>() {
+            renew(taps, plan, group, records, &mut scratch.joint);
+            let data = there_and_back(plan, records, &scratch.joint, x, weights, b);
+            scatter(records, &mut scratch.joint, &data, &mut scratch.products, out);
+        } else if let Some(records) = records.first_chunk::<1>() {
+            renew(taps, plan, group, records, &mut scratch.single);
+            let data = there_and_back(plan, records, &scratch.single, x, weights, b);
+            scatter(records, &mut scratch.single, &data, &mut scratch.products, out);
         }
-        scatter(records, scratch, &data, out, place);
     }
 }
 
-/// Writes out a record.
+/// Writes the records' share of b = A x; returns weights b.
 #[inline(always)]
-fn expand_by(taps: Taps, plan: &RowPlan, record: &Record, stride: usize, rows: &mut Expanded) {
+fn there_and_back<const N: usize>(
+    plan: &RowPlan,
+    records: &[Record; N],
+    rows: &Expanded<N>,
+    x: &Window<&[f32]>,
+    weights: &[f32],
+    b: &mut [f32],
+) -> [Lanes; N] {
+    let mut data = gather(records, rows, x);
+    take_own(plan, records, &data, b);
+    for (data, record) in data.iter_mut().zip(records) {
+        *data = product(data, &lanes_at(weights, record));
+    }
+    data
+}
+
+/// Writes out records.
+#[inline(always)]
+fn renew<const N: usize>(
+    taps: Taps,
+    plan: &RowPlan,
+    group: &Group,
+    records: &[Record; N],
+    rows: &mut Expanded<N>,
+) {
     match taps {
-        Taps::Cubic => expand::<true>(plan, record, stride as i32, rows),
-        Taps::Linear => expand::<false>(plan, record, stride as i32, rows),
+        Taps::Cubic => rows.renew::<true>(plan, group, records),
+        Taps::Linear => rows.renew::<false>(plan, group, records),
     }
 }
 
@@ -108,62 +174,80 @@ fn lanes_at(row: &[f32], record: &Record) -> Lanes {
     lanes
 }
 
-/// Puts the sums of a record's own pixels into their row.
+/// Puts the sums of the records' own pixels into their row.
 #[inline(always)]
-fn take_own(plan: &RowPlan, record: &Record, sum: &Lanes, row: &mut [f32]) {
-    let gain = &plan.lanes[record.lanes as usize].0;
-    let own = row[record.column as usize..].iter_mut();
-    for ((own, &sum), &gain) in own.zip(&sum.0).zip(gain) {
-        *own = if gain > 0.0 { sum } else { *own };
+fn take_own<const N: usize>(
+    plan: &RowPlan,
+    records: &[Record; N],
+    sums: &[Lanes; N],
+    row: &mut [f32],
+) {
+    for (record, sum) in records.iter().zip(sums) {
+        let gain = &plan.lanes[record.lanes as usize].0;
+        let own = &mut row[record.column as usize..];
+        if let Some(own) = own.first_chunk_mut::<LANES>() {
+            for i in 0..LANES {
+                own[i] = if gain[i] > 0.0 { sum.0[i] } else { own[i] };
+            }
+        } else {
+            for ((own, &sum), &gain) in own.iter_mut().zip(&sum.0).zip(gain) {
+                *own = if gain > 0.0 { sum } else { *own };
+            }
+        }
     }
 }
 
-/// The sums of a record's pixels.
+/// The sums of the records' pixels.
 #[inline(always)]
-fn gather(record: &Record, rows: &Expanded, x: &[f32], start: usize) -> Lanes {
-    let place = start + record.column as usize;
-    match record.kind {
-        Kind::Still => lanes_at(&x[start..], record),
-        Kind::Straight => gather_rows::<true>(rows, x, place),
-        Kind::Gentle | Kind::Curved => gather_rows::<false>(rows, x, place),
+fn gather<const N: usize>(
+    records: &[Record; N],
+    rows: &Expanded<N>,
+    x: &Window<&[f32]>,
+) -> [Lanes; N] {
+    match records[0].kind {
+        Kind::Still => records.each_ref().map(|record| lanes_at(&x.samples[x.start..], record)),
+        Kind::Straight => gather_rows::<true, N>(rows, x, x.place(&records[0])),
+        Kind::Gentle | Kind::Curved => gather_rows::<false, N>(rows, x, x.place(&records[0])),
     }
 }
 
 /// Sums of weights times samples, the latter together with their mirror images when `MIRRORED`.
 #[inline(always)]
-fn gather_rows<const MIRRORED: bool>(rows: &Expanded, x: &[f32], place: usize) -> Lanes {
-    let (weights, rest) = rows.weights[..rows.count].as_chunks::<4>();
-    let (deltas, rest_deltas) = rows.deltas[..rows.count].as_chunks::<4>();
-    // Four sums, so that additions need not wait for each other.
-    let [mut a, mut b, mut c, mut d] = [Lanes::ZERO; 4];
-    for (weights, deltas) in weights.iter().zip(deltas) {
-        a = add_product::<MIRRORED>(&a, &weights[0], x, place, deltas[0]);
-        b = add_product::<MIRRORED>(&b, &weights[1], x, place, deltas[1]);
-        c = add_product::<MIRRORED>(&c, &weights[2], x, place, deltas[2]);
-        d = add_product::<MIRRORED>(&d, &weights[3], x, place, deltas[3]);
+fn gather_rows<const MIRRORED: bool, const N: usize>(
+    rows: &Expanded<N>,
+    x: &Window<&[f32]>,
+    place: usize,
+) -> [Lanes; N] {
+    let mut sums = [Lanes::ZERO; N];
+    for (weights, &[dx, dy]) in rows.weights.iter().zip(&rows.places) {
+        let delta = dy as isize * x.stride as isize + dx as isize;
+        let there = blocks::<N>(x.samples, place.wrapping_add_signed(delta));
+        let back = if MIRRORED {
+            blocks::<N>(x.samples, place.wrapping_add_signed(-delta))
+        } else {
+            there
+        };
+        for n in 0..N {
+            sums[n] = add_product::<MIRRORED>(&sums[n], &weights[n], &there[n], &back[n]);
+        }
     }
-    for (weight, &delta) in rest.iter().zip(rest_deltas) {
-        a = add_product::<MIRRORED>(&a, weight, x, place, delta);
-    }
-    let mut sum = Lanes::ZERO;
-    for i in 0..LANES {
-        sum.0[i] = (a.0[i] + b.0[i]) + (c.0[i] + d.0[i]);
-    }
-    sum
+    sums
 }
 
-/// `sum` + `weight` x.
+/// The `N` blocks of samples from `place` on.
+#[inline(always)]
+fn blocks<const N: usize>(x: &[f32], place: usize) -> &[[f32; LANES]] {
+    &x[place..][..N * LANES].as_chunks().0[..N]
+}
+
+/// `sum` + `weight` (`there` + `back`), or without `back`.
 #[inline(always)]
 fn add_product<const MIRRORED: bool>(
     sum: &Lanes,
     weight: &Lanes,
-    x: &[f32],
-    place: usize,
-    delta: i32,
+    there: &[f32; LANES],
+    back: &[f32; LANES],
 ) -> Lanes {
-    let delta = delta as isize;
-    let there = &x[place.wrapping_add_signed(delta)..][..LANES];
-    let back = if MIRRORED { &x[place.wrapping_add_signed(-delta)..][..LANES] } else { there };
     let mut out = Lanes::ZERO;
     for i in 0..LANES {
         let both = if MIRRORED { there[i] + back[i] } else { there[i] };
@@ -172,45 +256,24 @@ fn add_product<const MIRRORED: bool>(
     out
 }
 
-/// Adds the weights of some records times their data to `x`.
+/// Adds the weights of the records times their data to `x`.
 #[inline(always)]
-fn scatter(
-    records: &[Record],
-    scratch: &Scratch,
-    data: &[Lanes; TOGETHER],
-    x: &mut [f32],
-    start: usize,
+fn scatter<const N: usize>(
+    records: &[Record; N],
+    rows: &mut Expanded<N>,
+    data: &[Lanes; N],
+    products: &mut Vec<Products>,
+    x: &mut Window<&mut [f32]>,
 ) {
-    let most = scratch.iter().take(records.len()).map(|rows| rows.count).max().unwrap_or(0);
-    for k in 0..most {
-        for ((record, rows), data) in records.iter().zip(scratch).zip(data) {
-            if k >= rows.count {
-                continue;
-            }
-            let (weight, delta) = (&rows.weights[k], rows.deltas[k] as isize);
-            let place = start + record.column as usize;
-            let product = product(weight, data);
-            add(&mut x[place.wrapping_add_signed(delta)..][..LANES], &product);
-            if record.kind == Kind::Straight {
-                add(&mut x[place.wrapping_add_signed(-delta)..][..LANES], &product);
-            }
+    write_products(&rows.weights, data, products);
+    let place = x.place(&records[0]);
+    for strand in rows.strands() {
+        let [dx, dy] = strand.place;
+        let delta = dy as isize * x.stride as isize + dx as isize;
+        add_strand::<false, N>(products, strand, x.samples, place.wrapping_add_signed(delta));
+        if records[0].kind == Kind::Straight {
+            let place = place.wrapping_add_signed(-delta - strand.range as isize);
+            add_strand::<true, N>(products, strand, x.samples, place);
         }
-    }
-}
-
-#[inline(always)]
-fn product(a: &Lanes, b: &Lanes) -> Lanes {
-    let mut out = Lanes::ZERO;
-    for i in 0..LANES {
-        out.0[i] = a.0[i] * b.0[i];
-    }
-    out
-}
-
-#[inline(always)]
-fn add(x: &mut [f32], lanes: &Lanes) {
-    let x = &mut x[..LANES];
-    for i in 0..LANES {
-        x[i] += lanes.0[i];
     }
 }
