@@ -194,6 +194,7 @@ def restored_frames(
                 result, chain, passes = other, second, 2
         if result.report["exposure_status"] == "unsure" and result.changed.any():
             result, chain = others.best(index, result, chain)
+        result = chain.joined(index) if result.changed.any() else result
         picture = source.as_came(result.planes, index, result.changed)
         report = result.report | {
             "passes": passes,
