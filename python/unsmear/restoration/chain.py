@@ -16,7 +16,6 @@ import numpy as np
 from unsmear import _unsmear
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
-from unsmear.restoration.joint import restore_jointly
 from unsmear.restoration.looks import (
     NEXT,
     SHARP_STRENGTH,
@@ -30,6 +29,7 @@ from unsmear.restoration.looks import (
 from unsmear.restoration.memo import Memo
 from unsmear.restoration.neighbours import Neighbours
 from unsmear.restoration.records import Alone, Restored, Settings
+from unsmear.restoration.several_frames import SeveralFrames
 from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
 from unsmear.restoration.verdict import judge
 
@@ -79,7 +79,7 @@ class Chain:
             noise=settings.noise,
             seed=settings.seed,
         )
-        self._neighbours = Neighbours(
+        neighbours = Neighbours(
             source,
             self.motion,
             self._exposure,
@@ -87,11 +87,18 @@ class Chain:
             method=settings.flow_method,
             options=settings.flow_options,
         )
+        self._several = SeveralFrames(
+            neighbours,
+            self.restored,
+            lambda index: self._look(index, source.planes(index)),
+            lambda index: self._exposure.exposure(index).noise,
+            settings.joint // 2,
+        )
 
     def forget_before(self, index: int) -> None:
         """Drop what no frame from ``index`` on needs."""
         self._memo.forget_before(index - KEPT_BEHIND)
-        self._neighbours.forget_before(index - KEPT_BEHIND)
+        self._several.forget_before(index - KEPT_BEHIND)
 
     def restored(self, index: int) -> Restored:
         """Return a frame restored by itself."""
@@ -205,7 +212,8 @@ class Chain:
             **verdict.report,
         }
         alone = Alone(single, pad, strength, sharp, verdict.share)
-        return self._composed(planes, single, alone, report, verdict.ratio)
+        restored = cropped(single, pad)
+        return self._composed(planes, restored, alone, report, verdict.ratio)
 
     def joined(self, index: int) -> Restored:
         """Return a restored frame with what its neighbours saw of it."""
@@ -213,21 +221,9 @@ class Chain:
         alone = before.alone
         if self._settings.joint == 1 or alone is None or not before.changed.any():
             return before
+        picture, more = self._several.restored(index)
         planes = self._source.planes(index)
-        joint = restore_jointly(
-            self._look(index, planes),
-            self._neighbours.around(index, self._settings.joint // 2),
-            alone.picture,
-            alone.pad,
-            strength=alone.strength,
-            noise=self._exposure.exposure(index).noise,
-            sharp=alone.sharp,
-        )
-        report = before.report | {
-            "neighbours_weight": joint.weight,
-            "kept_alone": joint.kept,
-        }
-        picture = cropped(joint.picture, joint.pad - alone.pad)
+        report = before.report | more
         return self._composed(planes, picture, alone, report, before.ratio)
 
     def _single(self, index: int, strength: float) -> tuple[Planes, int, bool]:
@@ -276,5 +272,5 @@ class Chain:
     ) -> Restored:
         share = alone.share
         changed = (share > 0) & np.isfinite(planes).all(axis=0)
-        mixed = planes + share * (cropped(picture, alone.pad) - planes)
+        mixed = planes + share * (picture - planes)
         return Restored(np.where(changed, mixed, planes), changed, ratio, report, alone)

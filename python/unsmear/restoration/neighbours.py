@@ -80,12 +80,12 @@ class Neighbours:
             memo=self._memo,
         )
 
-    def around(self, index: int, reach: int) -> list[Neighbour]:
-        """Return the frames up to ``reach`` away, where they show frame ``index``."""
+    def around(self, index: int, reach: int) -> dict[int, Neighbour]:
+        """Return the frames up to ``reach`` away, registered to frame ``index``."""
         first = max(0, index - reach)
         last = min(self._source.count - 1, index + reach)
         others = [other for other in range(first, last + 1) if other != index]
-        return [self._neighbour(other, index) for other in others]
+        return {other: self._neighbour(other, index) for other in others}
 
     def _neighbour(self, other: int, index: int) -> Neighbour:
         way, back = self._between.flow(other, index), self._between.flow(index, other)
