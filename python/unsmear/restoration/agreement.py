@@ -6,10 +6,10 @@ x_i and its neighbours x_n has less of either,
 
 .. math:: \bar x_i(p) = \frac{x_i(p) + \sum_n w_n(p) \, x_n(p + d_n(p))}
           {1 + \sum_n w_n(p)}, \qquad
-          w_n = s_n \frac{c^2}{c^2 + G * \min((x_n(p + d_n) - x_i)^2, 20^2)},
+          w_n = s_n \left(\frac{c^2}{c^2 + G * (x_n(p + d_n) - x_i)^2}\right)^2,
 
 d_n the displacement to the neighbour (`registration`), s_n in [0, 1] whether that shows
-the place, restored; c^2 = 16 sigma^2 + 32, G a Gaussian of 2 px. Values between pixels
+the place, restored; c^2 = 32 sigma^2 + 64, G a Gaussian of 2 px. Values between pixels
 are those of cubic splines. Units: grey levels, px.
 """
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["agreed"]
 
-GREATEST_ERROR = 20.0
 SMOOTHING = 2.0
 
 
@@ -49,15 +48,15 @@ def agreed(
     noise : float
         Standard deviation of the noise of the frames as they came, grey levels.
     """
-    scale = 16 * noise**2 + 32
+    scale = 32 * noise**2 + 64
     total = own.astype(np.float64)
     weights = np.ones(own.shape[1:])
     for planes, way, believed in neighbours:
         moved = np.stack([pulled(plane, way) for plane in planes]).astype(np.float64)
         known = np.isfinite(moved).all(axis=0) & np.isfinite(believed)
         error = ((np.where(known, moved, own) - own) ** 2).mean(axis=0)
-        error = smoothed(np.minimum(error, GREATEST_ERROR**2), SMOOTHING)
-        weight = np.where(known, believed, 0.0) * scale / (scale + error)
+        alike = scale / (scale + smoothed(error, SMOOTHING))
+        weight = np.where(known, believed, 0.0) * alike**2
         total += weight * np.where(known, moved, 0.0)
         weights += weight
     return (total / weights).astype(np.float32)
