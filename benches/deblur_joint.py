@@ -170,8 +170,11 @@ def main() -> None:
     parser.add_argument("--noises", nargs="+", type=float, default=[1.0])
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "deblur_joint")
+    parser.add_argument("--add", action="store_true", help="keep the rows of OUTPUT")
     given = parser.parse_args()
-    rows = []
+    rows: list[dict[str, Any]] = []
+    if given.add:
+        rows += json.loads(given.output.with_suffix(".json").read_text())["rows"]
     for case, name in itertools.product(given.cases, given.pictures):
         options = dict(CASES[case])
         turn = 97 * pictures.index(name) if name in pictures else 0

@@ -83,11 +83,14 @@ def deblur_sequence(
     flow_method : {"balanced", "fast", "accurate"}
         See `unsmear.optical_flow`, which takes ``flow_parameters``.
     joint : {1, 3}, default 1
-        Frames restored together: 3 uses the neighbours' data too, for 0 to 2 dB more
-        in about three times the time.
+        Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
+        come out 1 to 2 dB better, frames blurred in different directions more (4.7 dB
+        where their blur is known), and with less flicker than as they came; in half as
+        much time again for a whole clip.
     second_pass : bool, optional
-        Measure flow again on restored frames. Default: for frames whose acceleration
-        exceeds a quarter of their velocity, where blur differs between frames.
+        Measure flow again on restored frames, up to three passes in all, as long as
+        restored frames agree better. Default: for frames whose acceleration exceeds a
+        quarter of their velocity, where blur differs between frames.
     noise : float, optional
         Standard deviation of the noise in the units of ``frames``. Default: measured.
     seed : int, default 0
