@@ -10,8 +10,8 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear._parameters import merged
-from unsmear.restoration.alternatives import Alternatives, better
-from unsmear.restoration.chain import Chain
+from unsmear.restoration.alternatives import Alternatives
+from unsmear.restoration.passes import Passes
 from unsmear.restoration.records import Settings
 from unsmear.restoration.source import Source
 
@@ -26,8 +26,6 @@ __all__ = ["SequenceResult", "deblur_sequence", "restored_frames"]
 
 FLOW_METHODS = ("fast", "balanced", "accurate")
 JOINT = (1, 3)
-UNSTEADY = 0.25
-"""Acceleration relative to velocity from which a second pass is worth its time."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +83,14 @@ def deblur_sequence(
     flow_method : {"balanced", "fast", "accurate"}
         See `unsmear.optical_flow`, which takes ``flow_parameters``.
     joint : {1, 3}, default 1
-        Frames restored together: 3 uses the neighbours' data too, for 0 to 2 dB more
-        in about three times the time.
+        Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
+        come out 1 to 2 dB better, frames blurred in different directions more (4.7 dB
+        where their blur is known), and with less flicker than as they came; in half as
+        much time again for a whole clip.
     second_pass : bool, optional
-        Measure flow again on restored frames. Default: for frames whose acceleration
-        exceeds a quarter of their velocity, where blur differs between frames.
+        Measure flow again on restored frames, up to three passes in all, as long as
+        restored frames agree better. Default: for frames whose acceleration exceeds a
+        quarter of their velocity, where blur differs between frames.
     noise : float, optional
         Standard deviation of the noise in the units of ``frames``. Default: measured.
     seed : int, default 0
@@ -175,28 +176,16 @@ def restored_frames(
         frame = source.frame(index)
         return frame[..., 0] if frame.shape[-1] == 1 else frame
 
-    first = Chain(source, as_given, settings)
-
-    def as_restored(index: int) -> NDArray[Any]:
-        planes = first.restored(index).planes / source.scale
-        return planes[0] if len(planes) == 1 else np.moveaxis(planes, 0, -1)
-
-    second = Chain(source, as_restored, settings)
+    passes = Passes(source, as_given, settings)
     others = Alternatives(source, as_given, settings)
     for index in wanted:
-        result, chain, passes = first.restored(index), first, 1
-        again = second_pass
-        if again is None:
-            again = bool(result.changed.any()) and first.unsteadiness(index) > UNSTEADY
-        if again:
-            other = second.restored(index)
-            if better(other, result):
-                result, chain, passes = other, second, 2
+        result, chain, number = passes.best(index, second_pass)
         if result.report["exposure_status"] == "unsure" and result.changed.any():
             result, chain = others.best(index, result, chain)
+        result = chain.joined(index) if result.changed.any() else result
         picture = source.as_came(result.planes, index, result.changed)
         report = result.report | {
-            "passes": passes,
+            "passes": number,
             "joint": settings.joint,
             "flow_method": settings.flow_method,
             "flow_parameters": settings.flow_options,
@@ -204,8 +193,7 @@ def restored_frames(
             "version": _unsmear.__version__,
         }
         yield picture, chain.motion.motion(index).velocity, report
-        first.forget_before(index - 5)
-        second.forget_before(index)
+        passes.forget_before(index)
         others.forget_before(index)
 
 

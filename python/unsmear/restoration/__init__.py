@@ -1,15 +1,21 @@
 """The restoration of clips, step by step; `unsmear.deblur_sequence` is its face.
 
-| module       | step                                                             |
-|--------------|------------------------------------------------------------------|
-| source       | frames in grey levels                                            |
-| sampling     | pictures and fields between pixels                               |
-| looks        | what the solver takes                                            |
-| clip_motion  | velocity and acceleration of every frame                         |
-| clip_exposure| exposure of every frame, smoothed in time                        |
-| twin_frames  | how well a restored frame predicts its neighbours' restorations  |
-| joint        | several frames restored as one                                   |
-| verdict      | what to use, where, in words                                     |
-| chain        | the order of the steps                                           |
-| records, memo| what goes in and comes out; what is kept                         |
+| module         | step                                                            |
+|----------------|-----------------------------------------------------------------|
+| source         | frames in grey levels                                           |
+| sampling       | pictures and fields between pixels                              |
+| looks          | what the solver takes                                           |
+| clip_motion    | velocity and acceleration of every frame                        |
+| clip_exposure  | exposure of every frame, smoothed in time                       |
+| twin_frames    | how well a restored frame predicts its neighbours' restorations |
+| verdict        | what to use, where, in words                                    |
+| chain          | the order of the steps                                          |
+| passes         | flow measured again on restored frames                          |
+| alternatives   | other exposures, where the search was not sure                  |
+| registration   | smooth displacements between restored frames                    |
+| neighbours     | what frames next to one show of it                              |
+| joint          | several frames restored as one                                  |
+| agreement      | means along the motion, against flicker                         |
+| several_frames | these three in order                                            |
+| records, memo  | what goes in and comes out; what is kept                        |
 """

@@ -16,7 +16,6 @@ import numpy as np
 from unsmear import _unsmear
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
-from unsmear.restoration.joint import Neighbour, restore_jointly
 from unsmear.restoration.looks import (
     NEXT,
     SHARP_STRENGTH,
@@ -28,9 +27,11 @@ from unsmear.restoration.looks import (
     walk,
 )
 from unsmear.restoration.memo import Memo
-from unsmear.restoration.records import Restored, Settings
+from unsmear.restoration.neighbours import Neighbours
+from unsmear.restoration.records import Alone, Restored, Settings
+from unsmear.restoration.several_frames import SeveralFrames
 from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
-from unsmear.restoration.verdict import Verdict, judge
+from unsmear.restoration.verdict import judge
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,13 +79,29 @@ class Chain:
             noise=settings.noise,
             seed=settings.seed,
         )
+        neighbours = Neighbours(
+            source,
+            self.motion,
+            self._exposure,
+            self._twin,
+            method=settings.flow_method,
+            options=settings.flow_options,
+        )
+        self._several = SeveralFrames(
+            neighbours,
+            self.restored,
+            lambda index: self._look(index, source.planes(index)),
+            lambda index: self._exposure.exposure(index).noise,
+            settings.joint // 2,
+        )
 
     def forget_before(self, index: int) -> None:
         """Drop what no frame from ``index`` on needs."""
         self._memo.forget_before(index - KEPT_BEHIND)
+        self._several.forget_before(index - KEPT_BEHIND)
 
     def restored(self, index: int) -> Restored:
-        """Return a restored frame."""
+        """Return a frame restored by itself."""
         return self._memo.get("restored", index, lambda: self._restore(index))
 
     def unsteadiness(self, index: int) -> float:
@@ -194,10 +211,20 @@ class Chain:
             "sharp": sharp,
             **verdict.report,
         }
-        if self._settings.joint > 1 and (verdict.share > 0).any():
-            single, pad, weight = self._joint(index, single, pad, strength, sharp=sharp)
-            report["neighbours_weight"] = weight
-        return self._composed(planes, cropped(single, pad), verdict, report)
+        alone = Alone(single, pad, strength, sharp, verdict.share)
+        restored = cropped(single, pad)
+        return self._composed(planes, restored, alone, report, verdict.ratio)
+
+    def joined(self, index: int) -> Restored:
+        """Return a restored frame with what its neighbours saw of it."""
+        before = self.restored(index)
+        alone = before.alone
+        if self._settings.joint == 1 or alone is None or not before.changed.any():
+            return before
+        picture, more = self._several.restored(index)
+        planes = self._source.planes(index)
+        report = before.report | more
+        return self._composed(planes, picture, alone, report, before.ratio)
 
     def _single(self, index: int, strength: float) -> tuple[Planes, int, bool]:
         """Return the frame restored by itself, padded, and whether sharply.
@@ -235,50 +262,15 @@ class Chain:
             return pictures[-1], pad, True
         return cautious, pad, False
 
-    def _joint(
-        self,
-        index: int,
-        picture: Planes,
-        pad: int,
-        strength: float,
-        *,
-        sharp: bool,
-    ) -> tuple[Planes, int, float]:
-        reach = self._settings.joint // 2
-        neighbours = []
-        for other in range(index - reach, index + reach + 1):
-            way, back = self._way(index, other), self._way(other, index)
-            if other != index and way is not None and back is not None:
-                exposure = self._exposure.exposure(other).value
-                motion = self.motion.motion(other)
-                planes = self._source.planes(other)
-                neighbours.append(
-                    Neighbour(planes, motion, exposure, back, way, self._source.ceiling)
-                )
-        own = self._look(index, self._source.planes(index))
-        return restore_jointly(
-            own,
-            neighbours,
-            picture,
-            pad,
-            strength=strength,
-            noise=self._exposure.exposure(index).noise,
-            method=self._settings.flow_method,
-            sharp=sharp,
-        )
-
-    def _way(self, start: int, end: int) -> Planes | None:
-        """Return the flow between two frames next to each other."""
-        if abs(start - end) != 1:
-            return None
-        return self.motion.flow(start, end)
-
     @staticmethod
     def _composed(
-        planes: Planes, restored: Planes, verdict: Verdict, report: dict[str, Any]
+        planes: Planes,
+        picture: Planes,
+        alone: Alone,
+        report: dict[str, Any],
+        ratio: float,
     ) -> Restored:
-        changed = (verdict.share > 0) & np.isfinite(planes).all(axis=0)
-        mixed = planes + verdict.share * (restored - planes)
-        return Restored(
-            np.where(changed, mixed, planes), changed, verdict.ratio, report
-        )
+        share = alone.share
+        changed = (share > 0) & np.isfinite(planes).all(axis=0)
+        mixed = planes + share * (picture - planes)
+        return Restored(np.where(changed, mixed, planes), changed, ratio, report, alone)

@@ -1,37 +1,44 @@
 """Several frames restored as one, registered to the restoration itself.
 
-Frame n sees the scene of frame i moved: its path is D_n + d_n, with d_n(p) the flow
-from n to i. A registration wrong by 0.3 px costs most of what a second frame gives; so
-d_n is refined against the restoration x: with r_n = A_n x what frame n should have
-recorded, and e the flow from b_n to r_n,
+Frame n sees the scene of frame i moved: its path is D_n + d_n, with d_n(p) the smooth
+displacement from n to i (`registration`). The frames' own blurs differ, so it is found
+between restorations, and refined against the restoration x that is being made: with
+r_n = A_n x what frame n should have recorded and e the displacement from b_n to r_n,
 
     d_n(p) <- e(p) + d_n(p + e(p)).
 
 Two pictures blurred alike register to better than either to a sharp one. A datum of a
 neighbour counts by
 
-    w = seen * c^2 / (c^2 + G * min((r_n - b_n)^2, 20^2)),      c^2 = 2 sigma^2 + 1,
+    w = seen * c^2 / (c^2 + G * min((r_n - b_n)^2, 20^2)),      c^2 = 8 sigma^2 + 4,
 
 G a Gaussian of 6 px: where the neighbour does not show what the restoration predicts
-it is left out, whatever the reason.
+it is left out, whatever the reason. One frame alone knows little of what another one,
+blurred otherwise, recorded: hence two rounds, the second from what the first found. In
+the end x must still explain what the frame itself recorded: where the root of
+
+    G * min((A x - b)^2, 20^2) + sigma^2
+
+exceeds that of the restoration of the frame alone by a fifth to a half, the former
+gives way to the latter.
+
+K frames blurred alike are as one with a K-th of the noise's variance, for which the
+prior is weaker by K^(1.25 / 2) (`deblur/total_variation.rs`), while data count K times:
+lambda_K = K^0.375 lambda. Frames blurred differently leave less to the prior to guess
+and were best with K^0.5 to K^0.7 (photographs, noise 0 to 5); K^0.5 is used.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear.flow import optical_flow
-from unsmear.restoration.looks import SHARP_STRENGTH, Look, look, walk
-from unsmear.restoration.sampling import (
-    carried,
-    composed,
-    inside,
-    pulled_field,
-    smoothed,
-)
+from unsmear.restoration.looks import SHARP_STRENGTH, Look, cropped, look, walk
+from unsmear.restoration.registration import settled
+from unsmear.restoration.sampling import carried, pulled_field, smoothed
 from unsmear.restoration.source import Source
 
 if TYPE_CHECKING:
@@ -39,24 +46,29 @@ if TYPE_CHECKING:
 
     from unsmear.restoration.clip_motion import Motion
 
+    Plane = NDArray[np.float32]
     Planes = NDArray[np.float32]
     Field = NDArray[np.float32]
 
-__all__ = ["Neighbour", "restore_jointly"]
+__all__ = ["Joint", "Neighbour", "restore_jointly"]
 
 GREATEST_ERROR = 20.0
 SMOOTHING = 6.0
-STRENGTH = 0.6
-"""lambda of the joint restoration relative to that of one frame: less noise."""
-EFFORT = (4, 12)
-SMOOTHNESS = 0.2
-"""Of the flow that refines a registration: what is left of it varies slowly."""
+STRENGTH_EXPONENT = 0.5
+CAUTIOUS_STRENGTH = 0.6
+"""lambda of total variation relative to that of one frame: less noise."""
+ROUNDS = ((2, 12), (3, 12))
+"""Turns and steps of each solution, after as many registrations."""
+UNEXPLAINED = (1.2, 1.5)
+"""Residual relative to that of the frame alone from which, and at which at last, the
+frame alone is kept. A single frame fits its own noise by a tenth or so."""
 
 
+@dataclass
 class Neighbour:
     """A frame next to the one restored.
 
-    Parameters
+    Attributes
     ----------
     planes : ndarray of shape (C, H, W)
         Grey levels.
@@ -64,41 +76,26 @@ class Neighbour:
         Its own.
     exposure : float
         Its own.
-    offset, way : ndarray of shape (H, W, 2)
-        Flow from it to the restored frame, and back.
+    offset : ndarray of shape (H, W, 2)
+        Displacement from it to the restored frame, px; NaN = unknown.
+    seen : ndarray of shape (H, W)
+        How far its pixels are believed to show what the restored frame shows, [0, 1].
     ceiling : float or None
         Grey level from which its samples are clipped.
     """
 
-    def __init__(
-        self,
-        planes: Planes,
-        motion: Motion,
-        exposure: float,
-        offset: Field,
-        way: Field,
-        ceiling: float | None,
-    ) -> None:
-        self.planes = planes
-        self.motion = motion
-        self.exposure = exposure
-        self.offset = offset
-        self.ceiling = ceiling
-        visible = _unsmear.visibility(
-            np.ascontiguousarray(motion.velocity, np.float32), exposure
-        )
-        speed = np.linalg.norm(np.nan_to_num(offset), axis=-1)
-        back = np.linalg.norm(composed(offset, way), axis=-1)
-        hidden = ~(inside(offset) & (back < np.maximum(0.7, 0.1 * speed)))
-        hidden |= visible == 0
-        self.seen = (~_unsmear.dilated(hidden, 1)).astype(np.float32)
+    planes: Planes
+    motion: Motion
+    exposure: float
+    offset: Field
+    seen: Plane
+    ceiling: float | None = None
 
-    def look(self, weights: NDArray[np.float32]) -> Look:
+    def look(self, weights: Plane) -> Look:
         """Return the solver's look at it."""
-        velocity = carried(self.offset, self.motion.velocity)
         return look(
             self.planes,
-            velocity,
+            carried(self.offset, self.motion.velocity),
             self.motion.acceleration,
             self.exposure,
             weights,
@@ -106,64 +103,119 @@ class Neighbour:
             self.ceiling,
         )
 
-    def register(self, picture: Planes, pad: int, method: str) -> None:
+    def register(self, picture: Planes, pad: int) -> None:
         """Refine the offset against the padded restoration."""
         predicted = _unsmear.record_look(self.look(self.seen), picture, pad)
-        pair = np.stack([Source.luma_of(self.planes), Source.luma_of(predicted)])
-        rest = optical_flow(
-            np.nan_to_num(pair), index=0, method=method, smoothness=SMOOTHNESS
-        ).flow
+        recorded = np.nan_to_num(Source.luma_of(self.planes))
+        nothing = np.zeros_like(self.offset)
+        rest = settled(recorded, Source.luma_of(predicted), nothing, self.seen)
         moved = rest + pulled_field(self.offset, rest)
         self.offset = np.where(np.isfinite(moved), moved, self.offset)
 
     def trusted(self, picture: Planes, pad: int, noise: float) -> Look:
         """Return the look, weighted by how well the restoration predicts it."""
         every = self.look(self.seen)
-        predicted = _unsmear.record_look(every, picture, pad)
-        error = ((predicted - self.planes) ** 2).mean(axis=0, dtype=np.float64)
-        error = np.minimum(np.nan_to_num(error, nan=GREATEST_ERROR**2), 400.0)
-        scale = 2 * noise**2 + 1
-        weights = scale / (scale + smoothed(error, SMOOTHING))
-        every["weights"] = np.ascontiguousarray(
-            every["weights"] * weights, dtype=np.float32
-        )
+        error = _errors(every, picture, pad)
+        scale = 8 * noise**2 + 4
+        weights = every["weights"] * (scale / (scale + smoothed(error, SMOOTHING)))
+        every["weights"] = np.ascontiguousarray(weights, np.float32)
         return every
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What several frames gave.
+
+    Attributes
+    ----------
+    picture : ndarray of shape (C, H + 2 pad, W + 2 pad), float32
+        Grey levels.
+    pad : int
+        Of the picture.
+    weight : float
+        The neighbours' mean weight.
+    kept : float
+        Share of the frame in which its own restoration was kept.
+    """
+
+    picture: Planes
+    pad: int
+    weight: float
+    kept: float
 
 
 def restore_jointly(
     own: Look,
     neighbours: list[Neighbour],
-    picture: Planes,
+    alone: Planes,
     pad: int,
     *,
     strength: float,
     noise: float,
-    method: str,
     sharp: bool,
-    rounds: int = 1,
-) -> tuple[Planes, int, float]:
-    """Return the padded restoration, its padding, and the neighbours' mean weight.
+) -> Joint:
+    """Return the restoration of a frame with what its neighbours saw of it.
 
-    ``picture`` (C, H + 2 pad, W + 2 pad) is the restoration of the frame alone.
+    Parameters
+    ----------
+    own : Look
+        The frame itself.
+    neighbours : list of Neighbour
+        Their offsets are refined in place.
+    alone : ndarray of shape (C, H + 2 pad, W + 2 pad)
+        The frame restored by itself.
+    pad : int
+        Of ``alone``.
+    strength : float
+        lambda of one frame by total variation, grey levels.
+    noise : float
+        Standard deviation, grey levels.
+    sharp : bool
+        Whether the prior is the sharper one.
     """
-    weight = 0.0
-    for _ in range(rounds):
+    picture, now, weight = alone, pad, 0.0
+    for effort in ROUNDS if neighbours else ():
         for neighbour in neighbours:
-            neighbour.register(picture, pad, method)
-        looks = [own, *(n.trusted(picture, pad, noise) for n in neighbours)]
-        weight = float(np.mean([look["weights"].mean() for look in looks[1:]]))
-        needed = max(pad, _unsmear.looks_reach(looks))
-        picture = np.pad(picture, ((0, 0), *2 * ((needed - pad,) * 2,)), mode="edge")
-        pad = needed
-        way = STRENGTH * strength * (SHARP_STRENGTH if sharp else 1.0)
+            neighbour.register(picture, now)
+        looks = [own, *(n.trusted(picture, now, noise) for n in neighbours)]
+        each = [float(one["weights"].mean()) for one in looks[1:]]
+        weight = float(np.mean(each))
+        way = strength * CAUTIOUS_STRENGTH
+        if sharp:
+            way = strength * SHARP_STRENGTH * (1 + sum(each)) ** STRENGTH_EXPONENT
+        needed = max(now, _unsmear.looks_reach(looks))
+        picture, now = _padded(picture, needed - now), needed
         pictures, _ = walk(
-            looks,
-            (way,),
-            noise,
-            pad=pad,
-            first=EFFORT,
-            start=picture,
-            sharp=sharp,
+            looks, (way,), noise, pad=now, first=effort, start=picture, sharp=sharp
         )
         picture = pictures[-1]
-    return picture, pad, weight
+    alone = _padded(alone, now - pad)
+    share = _explained(own, picture, alone, now, noise)
+    mixed = alone + share * (picture - alone)
+    kept = float(1 - cropped(share[np.newaxis], now).mean())
+    return Joint(np.ascontiguousarray(mixed, np.float32), now, weight, kept)
+
+
+def _explained(
+    own: Look, picture: Planes, alone: Planes, pad: int, noise: float
+) -> Plane:
+    """Return the share of the joint restoration to use, (H + 2 pad, W + 2 pad)."""
+    ours, before = (
+        np.sqrt(smoothed(_errors(own, one, pad), SMOOTHING) + noise**2 + 1e-6)
+        for one in (picture, alone)
+    )
+    low, high = UNEXPLAINED
+    share = np.clip((high - ours / before) / (high - low), 0.0, 1.0)
+    return np.pad(share, pad, mode="edge").astype(np.float32)
+
+
+def _errors(at: Look, picture: Planes, pad: int) -> NDArray[np.float64]:
+    """Return (A x - b)^2, limited, as the mean of the channels; (H, W)."""
+    predicted = _unsmear.record_look(at, picture, pad)
+    error = ((predicted - at["planes"]) ** 2).mean(axis=0, dtype=np.float64)
+    most = GREATEST_ERROR**2
+    return np.asarray(np.minimum(np.nan_to_num(error, nan=most), most))
+
+
+def _padded(picture: Planes, more: int) -> Planes:
+    return np.pad(picture, ((0, 0), (more, more), (more, more)), mode="edge")

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Planes = NDArray[np.float32]
 
-__all__ = ["Restored", "Settings"]
+__all__ = ["Alone", "Restored", "Settings"]
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,31 @@ class Settings:
     flow_options: dict[str, Any]
     joint: int
     seed: int
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A frame restored by itself, before it is mixed with what came.
+
+    Attributes
+    ----------
+    picture : ndarray of shape (C, H + 2 pad, W + 2 pad), float32
+        Grey levels.
+    pad : int
+        Of the picture.
+    strength : float
+        lambda of total variation, grey levels.
+    sharp : bool
+        Whether the sharper prior was better.
+    share : ndarray of shape (H, W), float32
+        Of the restoration in the result.
+    """
+
+    picture: Planes
+    pad: int
+    strength: float
+    sharp: bool
+    share: Planes
 
 
 @dataclass(frozen=True)
@@ -40,9 +65,12 @@ class Restored:
         Of the verdict.
     report : dict
         Plain data.
+    alone : Alone or None
+        What a joint restoration starts from; None where nothing was restored.
     """
 
     planes: Planes
     changed: NDArray[np.bool_]
     ratio: float
     report: dict[str, Any]
+    alone: Alone | None = None

@@ -6,13 +6,15 @@ around them (`sequence`). A `World` (`ray_caster`) holds solid bodies (`solids`,
 `terrain`) with patterns (`surface`), each with a pose as a function of time (`pose`),
 lit, shadowed and seen by a moving camera; nine of them recreate in kind the scenes of
 the founding work (`thesis_scenes`). `blur_cases` are single pictures blurred by known
-motions, to judge deblurring by. Because motions are functions of time, flow is exact
-and a blurred frame is a true integral over its exposure.
+motions, `exposure_series` several exposures of one scene, to judge deblurring by.
+Because motions are functions of time, flow is exact and a blurred frame is a true
+integral over its exposure.
 """
 
 from __future__ import annotations
 
 from unsmear.synthetic.blur_cases import BLUR_CASES, BlurCase, blur_case, blur_clip
+from unsmear.synthetic.exposure_series import ExposureSeries, exposure_series
 from unsmear.synthetic.lighting import Light, Sky
 from unsmear.synthetic.motion import (
     Motion,
@@ -48,6 +50,7 @@ __all__ = [
     "Box",
     "Camera",
     "Disc",
+    "ExposureSeries",
     "Layer",
     "Light",
     "Motion",
@@ -62,6 +65,7 @@ __all__ = [
     "blur_case",
     "blur_clip",
     "checkers",
+    "exposure_series",
     "flowing",
     "layers",
     "looking",
