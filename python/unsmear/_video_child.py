@@ -58,7 +58,7 @@ def decoded_frames(container: Any) -> Iterator[Any]:
 
 def bits_of(frame: Any) -> int:
     """Return the bits per sample of a frame."""
-    return max(component.bits for component in frame.format.components)
+    return max(int(component.bits) for component in frame.format.components)
 
 
 def sample_format(frame: Any) -> str:
@@ -74,16 +74,18 @@ def described(container: Any, frame: Any, turned: int) -> dict[str, Any]:
     stream = container.streams.video[0]
     rate = stream.average_rate or stream.base_rate or stream.guessed_rate
     ratio = stream.sample_aspect_ratio or 1
+    aspect = [ratio.numerator, ratio.denominator]
     chroma = None
     if not frame.format.is_rgb and len(frame.format.components) >= 3:
         part = frame.format.components[1]
-        chroma = [frame.width // part.width, frame.height // part.height]
+        # Planes of half the size are rounded up.
+        chroma = [-(-frame.width // part.width), -(-frame.height // part.height)]
     base = frame.time_base or stream.time_base
     return {
         "bits": bits_of(frame),
         "rate": [rate.numerator, rate.denominator] if rate else None,
         "time_base": [base.numerator, base.denominator] if base else None,
-        "pixel_aspect": [ratio.denominator, ratio.numerator][:: 1 if turned % 2 else -1],
+        "pixel_aspect": aspect[::-1] if turned % 2 else aspect,
         "chroma": chroma,
         "colour": {
             "range": int(frame.color_range),

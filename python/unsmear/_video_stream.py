@@ -106,7 +106,7 @@ class VideoStream:
         # hide modules of others.
         script = Path(__file__).with_name("_video_child.py")
         command = [sys.executable, "-P", str(script), str(path.absolute())]
-        self._complaints = tempfile.TemporaryFile()
+        self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 -- see `close`
         self._child = subprocess.Popen(
             [*command, str(skipped)],
             stdin=subprocess.DEVNULL,

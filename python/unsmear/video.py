@@ -8,7 +8,7 @@ Written formats
 ---------------
 .mkv .avi   FFV1 (RFC 9043), lossless: what is read equals what was written, 8 and
             16 bit, grey and RGB.
-.mp4 .mov   H.264 (ITU-T H.264), 8 bit, constant rate factor `_H264_QUALITY`; chroma is
+.mp4 .mov   H.264 (ITU-T H.264), 8 bit, constant rate factor `H264_QUALITY`; chroma is
             halved (4:2:0), which every player shows, unless a side is odd (4:4:4).
 """
 
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_LOSSLESS = frozenset({".mkv", ".avi"})
-WRITE_SUFFIXES = _LOSSLESS | {".mp4", ".mov"}
+LOSSLESS_SUFFIXES = frozenset({".mkv", ".avi"})
+WRITE_SUFFIXES = LOSSLESS_SUFFIXES | {".mp4", ".mov"}
 READ_SUFFIXES = WRITE_SUFFIXES | {
     ".m4v", ".3gp", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ts", ".mts", ".m2ts",
     ".ogv", ".y4m",
 }  # fmt: skip
 # Visually lossless; the encoder's own default of 23 blurs the detail this is about.
-_H264_QUALITY = "14"
-_SMPTE_170M = 6  # the BT.601 matrix, by its number in ITU-T H.273
+H264_QUALITY = "14"
+SMPTE_170M = 6  # the BT.601 matrix, by its number in ITU-T H.273
 _LARGEST_DENOMINATOR = 1001  # holds the 30000/1001 of NTSC exactly
 _STANDARD_FORMATS = {  # (channels, bits): samples handed over, samples coded
     (1, 8): ("gray", "gray"),
@@ -89,7 +89,7 @@ def write_video(path: Path, frames: NDArray[Any], fps: float) -> None:
         If PyAV is not installed.
     """
     av = require_pyav()
-    lossless = path.suffix.lower() in _LOSSLESS
+    lossless = path.suffix.lower() in LOSSLESS_SUFFIXES
     samples = as_integers(frames, "frames", None if lossless else 8)
     channels = 1 if samples.ndim == 3 else 3
     given, coded = _STANDARD_FORMATS[channels, 8 * samples.dtype.itemsize]
@@ -101,8 +101,8 @@ def write_video(path: Path, frames: NDArray[Any], fps: float) -> None:
         stream = container.add_stream("ffv1" if lossless else "libx264", rate=rate)
         stream.width, stream.height, stream.pix_fmt = width, height, coded
         if not lossless:
-            stream.options = {"crf": _H264_QUALITY}
-            stream.codec_context.colorspace = _SMPTE_170M
+            stream.options = {"crf": H264_QUALITY}
+            stream.codec_context.colorspace = SMPTE_170M
         try:
             for picture in samples:
                 frame = av.VideoFrame.from_ndarray(picture, format=given)
