@@ -95,7 +95,9 @@ def join(job: dict[str, Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
+    # Unbuffered: a lock on the buffer could not be taken back at the end.
+    while os.read(0, 1):
+        pass
     os._exit(1)
 
 

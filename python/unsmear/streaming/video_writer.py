@@ -245,7 +245,7 @@ def _lossless_format(bits: int, *, grey: bool) -> str:
 def _complain(status: int, text: str) -> None:
     """Raise what the child that joins the pieces died of."""
     if status < 0:
-        raise ValueError(f"the sound could not be copied: crashed (signal {-status})")
+        raise ValueError(f"the video could not be joined: crashed (signal {-status})")
     last = (text.splitlines() or ["0 no reason given"])[-1]
     number, _, reason = last.partition(" ")
     if number.isdigit() and int(number):
