@@ -8,6 +8,7 @@ is a file of JSON:
     output      the file to write
     ticks       time of every frame, in units of
     unit        [numerator, denominator] seconds
+    rate        [numerator, denominator] frames per second, or null if it varies
     sound       file to copy the audio streams from, or null
     trial       whether to stop behind the header, which shows what does not fit
 
@@ -66,6 +67,27 @@ def sounds(source: Any, streams: dict[int, Any]) -> Iterator[Timed]:
             yield time, 1, packet
 
 
+def added(av: Any, output: Any, like: Any, rate: list[int] | None) -> Any:
+    """Return a stream for packets of the stream ``like``.
+
+    Only the encoder's own stream carries a frame rate into Matroska's header; FFV1's
+    head, unlike that of H.264, is the same in every container.
+    """
+    given = like.codec_context
+    if rate is None or given.name != "ffv1":
+        return output.add_stream_from_template(like)
+    stream = output.add_stream("ffv1", rate=Fraction(*rate))
+    stream.width, stream.height, stream.pix_fmt = like.width, like.height, given.pix_fmt
+    context = stream.codec_context
+    context.flags |= av.codec.context.Flags.bitexact.value
+    context.thread_count = 1
+    if like.sample_aspect_ratio:
+        context.sample_aspect_ratio = like.sample_aspect_ratio
+    context.color_primaries = given.color_primaries
+    context.color_trc = given.color_trc
+    return stream
+
+
 def join(job: dict[str, Any]) -> None:
     """Write the file."""
     av = importlib.import_module("av")
@@ -75,7 +97,7 @@ def join(job: dict[str, Any]) -> None:
             av.open(job["output"], "w", container_options=_BITEXACT)
         )
         output.flags |= av.container.Flags.bitexact.value
-        video = output.add_stream_from_template(first.streams.video[0])
+        video = added(av, output, first.streams.video[0], job["rate"])
         video.time_base = Fraction(*job["unit"])
         ways = [pictures(av, job, video)]
         if job["sound"]:
@@ -88,6 +110,11 @@ def join(job: dict[str, Any]) -> None:
             }
             ways.append(sounds(source, audio))
         output.start_encoding()
+        if (
+            video.codec_context.extradata
+            != first.streams.video[0].codec_context.extradata
+        ):
+            raise ValueError("the pieces were made by another encoder")
         if not job["trial"]:
             # In order of time, or the container would hold back one of them whole.
             for _, _, packet in heapq.merge(*ways, key=lambda timed: timed[:2]):

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _STAMP_BYTES = 8
 _UNTIMED = -(2**63)  # as in `_video_child`
+CONVERSION = 0x4 | 0x2000 | 0x40000 | 0x80000  # as in `_video_child`
 _LONGEST_HEADER = 1 << 16
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear._atomic import atomic_path
-from unsmear._video_stream import VideoStream, require_pyav
+from unsmear._video_stream import CONVERSION, VideoStream, require_pyav
 from unsmear.images import as_integers
 
 if TYPE_CHECKING:
@@ -106,7 +106,8 @@ def write_video(path: Path, frames: NDArray[Any], fps: float) -> None:
         try:
             for picture in samples:
                 frame = av.VideoFrame.from_ndarray(picture, format=given)
-                container.mux(stream.encode(frame.reformat(format=coded)))
+                coded_frame = frame.reformat(format=coded, interpolation=CONVERSION)
+                container.mux(stream.encode(coded_frame))
             container.mux(stream.encode(None))
         except av.FFmpegError as error:
             raise ValueError(

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from unsmear._video_stream import require_pyav
+from unsmear._video_stream import CONVERSION, require_pyav
 from unsmear.images import as_integers
 from unsmear.streaming.clock import LARGEST_DENOMINATOR
 from unsmear.streaming.writer import Writer, in_unit_range, require_unit_range
@@ -146,19 +146,20 @@ class VideoWriter(Writer):
         """Encode the first frame, so that what does not fit shows at once."""
         piece = folder / f".tmp-trial{self.suffix}"
         whole = folder / f".tmp-trial-whole{self._final}"
-        try:
-            self.write_piece(piece, [self._clip[0]])
-            self._join([piece], whole, 1 / self._rate, [0], trial=True)
-        except OSError as error:
-            if error.errno:
-                raise
-            raise ValueError(
-                f"the sound of {str(self._clip.path)!r} must suit {self._final}, got "
-                f"{error}; write .mkv, or leave the sound out"
-            ) from error
-        finally:
-            piece.unlink(missing_ok=True)
-            whole.unlink(missing_ok=True)
+        self.write_piece(piece, [self._clip[0]])
+        sound, self._sound = self._sound, None
+        self._join([piece], whole, 1 / self._rate, [0], trial=True)
+        self._sound = sound
+        if sound:
+            try:
+                self._join([piece], whole, 1 / self._rate, [0], trial=True)
+            except OSError as error:
+                raise ValueError(
+                    f"the sound of {str(self._clip.path)!r} must suit {self._final}, "
+                    f"got {error}; write .mkv, or leave the sound out"
+                ) from error
+        piece.unlink()
+        whole.unlink(missing_ok=True)
 
     def _configure(self, stream: Any) -> None:
         height, width = self._clip.shape[1:3]
@@ -189,11 +190,12 @@ class VideoWriter(Writer):
             given = "rgb24" if samples.dtype == np.uint8 else "rgb48le"
         frame = self._av.VideoFrame.from_ndarray(samples, format=given)
         if self._lossless:
-            return frame.reformat(format=self._format)
+            return frame.reformat(format=self._format, interpolation=CONVERSION)
         return frame.reformat(
             format=self._format,
             dst_colorspace=self._matrix,
             dst_color_range=self._range,
+            interpolation=CONVERSION,
         )
 
     def _join(
@@ -205,7 +207,11 @@ class VideoWriter(Writer):
         *,
         trial: bool,
     ) -> None:
+        rate = None
+        if self._clip.clock.stamps is None or self._final == ".avi":
+            rate = [self._rate.numerator, self._rate.denominator]
         job = {
+            "rate": rate,
             "pieces": [str(piece) for piece in pieces],
             "output": str(target),
             "ticks": ticks,
