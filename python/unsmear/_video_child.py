@@ -33,6 +33,8 @@ _QUARTER_TURN = 90
 # Bicubic chroma at full width, rounded, not cut, the same on every processor: flags of
 # the converter; its own choice darkens by more than a grey level.
 _CONVERSION = 0x4 | 0x2000 | 0x40000 | 0x80000
+# Pictures and text that the decoder would take for one frame, lists of other files.
+_NO_VIDEOS = {"image2", "tty", "concat", "hls", "dash", "imf"}
 _OPTIONS = {"protocol_whitelist": "file"}
 
 
@@ -42,6 +44,9 @@ class BrokenVideoError(Exception):
 
 def decoded_frames(container: Any) -> Iterator[Any]:
     """Yield the frames of the first video stream; BrokenVideoError at a damaged one."""
+    kind = container.format.name
+    if kind.endswith("_pipe") or kind in _NO_VIDEOS:
+        raise BrokenVideoError(f"it is no video by what it holds ({kind})")
     if not container.streams.video:
         raise BrokenVideoError("it holds no video stream")
     stream = container.streams.video[0]
