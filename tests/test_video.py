@@ -80,7 +80,9 @@ def test_a_crash_of_the_decoder_is_an_error(tmp_path: Path, monkeypatch):
     write_frames(tmp_path / "a.mkv", frames_of(np.uint8, 2, 8, 8))
     script = tmp_path / "_video_child.py"
     script.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n")
-    monkeypatch.setattr("unsmear.video.__file__", str(tmp_path / "video.py"))
+    monkeypatch.setattr(
+        "unsmear._video_stream.__file__", str(tmp_path / "_video_stream.py")
+    )
     with pytest.raises(ValueError, match="the decoder crashed"):
         read_video(tmp_path / "a.mkv")
 

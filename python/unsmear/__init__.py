@@ -17,8 +17,13 @@ from unsmear.motions import Motion, several_motions, velocity_votes
 from unsmear.psf import fspecial_motion, motion_psf
 from unsmear.sequence import SequenceResult, deblur_sequence
 from unsmear.sequences import read_frames, write_frames
+from unsmear.streaming.clip import Clip, open_clip
+from unsmear.streaming.deblur_clip import deblur_clip
+from unsmear.streaming.results import ClipResult
 
 __all__ = [
+    "Clip",
+    "ClipResult",
     "ComponentVelocities",
     "DeblurResult",
     "DemoClip",
@@ -32,6 +37,7 @@ __all__ = [
     "blur",
     "component_velocities",
     "deblur",
+    "deblur_clip",
     "deblur_sequence",
     "demo_clip",
     "estimate_exposure",
@@ -40,6 +46,7 @@ __all__ = [
     "metrics",
     "motion_psf",
     "noise",
+    "open_clip",
     "optical_flow",
     "plot",
     "read_flow",

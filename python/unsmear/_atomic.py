@@ -49,6 +49,22 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
     ValueError
         If ``target`` exists and is not a regular file (a folder, a device).
     """
+    final = replaceable(target)
+    temporary = final.with_name(f".tmp-{secrets.token_hex(8)}{final.suffix}")
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY
+    # os.open honours the umask, which tempfile.mkstemp (always 0600) does not.
+    os.close(os.open(temporary, flags, _NEW_FILE_MODE))
+    try:
+        yield temporary
+        put_in_place(temporary, final)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def replaceable(target: str | os.PathLike[str]) -> Path:
+    """Return the file to write for ``target``, links followed, checked as above."""
     final = Path(os.path.realpath(target))
     if final.exists() and not final.is_file():
         raise ValueError(
@@ -60,19 +76,14 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
             f"target: the folder {str(final.parent)!r} does not exist; "
             "create it before writing"
         )
-    temporary = final.with_name(f".tmp-{secrets.token_hex(8)}{final.suffix}")
-    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY
-    # os.open honours the umask, which tempfile.mkstemp (always 0600) does not.
-    os.close(os.open(temporary, flags, _NEW_FILE_MODE))
-    try:
-        yield temporary
-        if final.exists():
-            shutil.copymode(final, temporary)
-        os.replace(temporary, final)  # noqa: PTH105 -- the atomic rename itself
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
+    return final
+
+
+def put_in_place(temporary: Path, final: Path) -> None:
+    """Give a file that is whole its name, and the permissions of the one it follows."""
+    if final.exists():
+        shutil.copymode(final, temporary)
+    os.replace(temporary, final)  # noqa: PTH105 -- the atomic rename itself
 
 
 def write_bytes_atomic(target: str | os.PathLike[str], data: bytes) -> None:

@@ -24,7 +24,10 @@ _LOOP_FOREVER = b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
 _TABLE_FLAG = 0x80
 _TABLE_SIZE = 0x07  # a table has 2^(n + 1) colours of three bytes
 _SHORTEST_DELAY = 2  # 1/100 s; viewers slow anything shorter down to 10
+_LONGEST_DELAY = 2**16 - 1
 _LARGEST_SIDE = 2**16 - 1
+HUNDREDTHS = 100  # of a second: the unit of delays
+GIF_TAIL = b"\x3b"
 
 
 def encode_gif(frames: NDArray[Any], fps: float) -> bytes:
@@ -33,19 +36,28 @@ def encode_gif(frames: NDArray[Any], fps: float) -> bytes:
     Grey is exact; colour is reduced to 256 colours per frame. The delay is rounded to
     1/100 s and at least 2/100 s.
     """
-    height, width = frames.shape[1:3]
+    delay = round(HUNDREDTHS / fps)
+    pieces = [gif_head(*frames.shape[1:3])]
+    pieces += [gif_frame(frame, delay) for frame in frames]
+    return b"".join(pieces) + GIF_TAIL
+
+
+def gif_head(height: int, width: int) -> bytes:
+    """Return what stands before the first frame."""
     if max(height, width) > _LARGEST_SIDE:
         raise ValueError(
             f"frames must be at most {_LARGEST_SIDE} pixels wide and high for .gif, "
             f"got {width} x {height}"
         )
-    delay = max(_SHORTEST_DELAY, round(100 / fps))
-    control = b"\x21\xf9\x04\x00" + struct.pack("<H", delay) + b"\x00\x00"
     screen = b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0)
-    pieces = [screen, _LOOP_FOREVER]
-    for frame in frames:
-        pieces += [control, _picture_block(frame)]
-    return b"".join(pieces) + b"\x3b"
+    return screen + _LOOP_FOREVER
+
+
+def gif_frame(frame: NDArray[Any], delay: int) -> bytes:
+    """Encode (H, W) or (H, W, 3) uint8, shown for ``delay`` hundredths of a second."""
+    shown = min(max(_SHORTEST_DELAY, delay), _LONGEST_DELAY)
+    control = b"\x21\xf9\x04\x00" + struct.pack("<H", shown) + b"\x00\x00"
+    return control + _picture_block(frame)
 
 
 def _picture_block(frame: NDArray[Any]) -> bytes:

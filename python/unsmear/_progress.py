@@ -7,8 +7,9 @@ cancels the call and is raised unchanged.
 from __future__ import annotations
 
 import sys
-import time
 from typing import TYPE_CHECKING, TextIO
+
+from tqdm import tqdm
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,9 +17,6 @@ if TYPE_CHECKING:
 
     Progress = Callable[[float], object]
     Steps = Callable[[int, int], object]
-
-_WIDTH = 24
-_REDRAW = 0.1  # seconds
 
 
 def of_steps(progress: Progress | None) -> Steps | None:
@@ -33,27 +31,30 @@ def of_steps(progress: Progress | None) -> Steps | None:
 
 
 class ProgressBar:
-    """A bar on a terminal's last line; silent when the stream is not a terminal."""
+    """A bar with the time left on a terminal's last line; silent elsewhere."""
 
     def __init__(self, label: str, stream: TextIO | None = None) -> None:
-        self._label = label
-        self._stream = sys.stderr if stream is None else stream
-        self._shown = self._stream.isatty()
-        self._start = time.monotonic()
-        self._drawn = float("-inf")
+        shown = sys.stderr if stream is None else stream
+        self._bar = tqdm(
+            total=1.0,
+            desc=label,
+            file=shown,
+            disable=not shown.isatty(),
+            leave=False,
+            bar_format="{desc} {percentage:3.0f}% |{bar}| {elapsed} < {remaining}",
+            # Frames take about equally long: the mean of all tells best.
+            smoothing=0.0,
+        )
+        self._begun = False
 
     def __call__(self, share: float) -> None:
         """Show that ``share`` of the work is done."""
-        now = time.monotonic()
-        if not self._shown or (share < 1 and now - self._drawn < _REDRAW):
-            return
-        self._drawn = now
-        full = round(share * _WIDTH)
-        bar = "#" * full + "." * (_WIDTH - full)
-        seconds = now - self._start
-        left = f"{seconds * (1 / share - 1):4.0f} s left" if share > 0 else ""
-        self._stream.write(f"\r{self._label} [{bar}] {share:4.0%} {left}\x1b[K")
-        self._stream.flush()
+        if not self._begun and share > 0:
+            # What an earlier run has done took no time in this one.
+            self._begun = True
+            self._bar.reset(total=1.0)
+            self._bar.initial = self._bar.n = self._bar.last_print_n = share
+        self._bar.update(min(share, 1.0) - self._bar.n)
 
     def __enter__(self) -> ProgressBar:
         return self
@@ -64,6 +65,4 @@ class ProgressBar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._shown:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
+        self._bar.close()

@@ -14,6 +14,7 @@ Source: Adobe Systems, TIFF Revision 6.0 (1992): sections 8 (tags), 13 (LZW).
 
 from __future__ import annotations
 
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ import tifffile
 from unsmear._format_error import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -43,19 +45,10 @@ def read_tiff(path: Path) -> NDArray[Any] | None:
         the file is shorter than it says.
     """
     with tifffile.TiffFile(path) as tif:
-        # Reduced-resolution copies (thumbnails) are no frames.
-        series = [s for s in tif.series if not s.keyframe.is_reduced]
-        if not series:
-            raise FormatError("at least one picture", "none")
-        if len(series) > 1:
-            shapes = f"{series[0].shape} and {series[1].shape}"
-            raise FormatError("pages of one size and type", f"shapes {shapes}")
-        stack, page = series[0], series[0].keyframe
-        photometric = getattr(page.photometric, "name", str(page.photometric))
-        if photometric not in _PLAIN:
+        stack = _stack_of(tif, path)
+        if stack is None:
             return None
-        if stack.nbytes > _LARGEST_RATIO * path.stat().st_size:
-            raise FormatError("a size the file can hold", f"{stack.nbytes} bytes")
+        page = stack.keyframe
         try:
             samples = np.asarray(stack.asarray())
         except ValueError as error:
@@ -63,24 +56,100 @@ def read_tiff(path: Path) -> NDArray[Any] | None:
             if "imagecodecs" in str(error) and lossless_in_pillow:
                 return None
             raise
-        if page.bitspersample == 1:
-            samples = samples.astype(np.uint8) * np.uint8(255)
-        frames = _ordered(samples, stack.axes, photometric)
-        tag = page.tags.get(_ORIENTATION)
+        return _finished(samples, stack.axes, page)
+
+
+def tiff_frames(path: Path, start: int) -> Iterator[NDArray[Any]] | None:
+    """Return the frames from ``start`` on, read one by one.
+
+    None = one by one they cannot be read: use `read_tiff`. Errors as there, in the
+    iteration.
+    """
+    with tifffile.TiffFile(path) as tif:
+        stack = _stack_of(tif, path)
+        if stack is None:
+            return None
+        axes = str(stack.axes)
+        # One axis of time, first; several (a hyperstack) are for `read_tiff` to judge.
+        alone = axes[1:] in ("YX", "YXS") and axes[0] not in "YXSC"
+        count = int(stack.shape[0])
+        contiguous = stack.dataoffset is not None
+        if not alone or not (contiguous or len(stack.pages) == count):
+            return None
+    return _each_frame(path, start)
+
+
+def _each_frame(path: Path, start: int) -> Iterator[NDArray[Any]]:
+    with tifffile.TiffFile(path) as tif:
+        stack = _stack_of(tif, path)
+        assert stack is not None, "the caller has looked"
+        shape = stack.shape[1:]
+        size = prod(shape)
+        dtype = np.dtype(tif.byteorder + stack.dtype.char)
+        for number in range(start, int(stack.shape[0])):
+            if stack.dataoffset is None:
+                samples = stack.pages[number].asarray()
+            else:
+                offset = stack.dataoffset + number * size * dtype.itemsize
+                samples = tif.filehandle.read_array(dtype, size, offset).reshape(shape)
+            native = samples.astype(dtype.newbyteorder("="), copy=False)
+            yield _finished(native, stack.axes[1:], stack.keyframe)[0]
+
+
+def _stack_of(tif: Any, path: Path) -> Any | None:
+    """Return the one series of pictures; None = for Pillow to read."""
+    # Reduced-resolution copies (thumbnails) are no frames.
+    series = [s for s in tif.series if not s.keyframe.is_reduced]
+    if not series:
+        raise FormatError("at least one picture", "none")
+    if len(series) > 1:
+        shapes = f"{series[0].shape} and {series[1].shape}"
+        raise FormatError("pages of one size and type", f"shapes {shapes}")
+    stack = series[0]
+    if _photometric(stack.keyframe) not in _PLAIN:
+        return None
+    if stack.nbytes > _LARGEST_RATIO * path.stat().st_size:
+        raise FormatError("a size the file can hold", f"{stack.nbytes} bytes")
+    return stack
+
+
+def _photometric(page: Any) -> str:
+    return str(getattr(page.photometric, "name", page.photometric))
+
+
+def _finished(samples: NDArray[Any], axes: str, page: Any) -> NDArray[Any]:
+    """Return (T, H, W[, 3]) upright, white high, of a type that is kept."""
+    if page.bitspersample == 1:
+        samples = samples.astype(np.uint8) * np.uint8(255)
+    frames = _ordered(samples, axes, _photometric(page))
     if frames.dtype.name not in _DTYPES:
         raise FormatError(f"one of {', '.join(_DTYPES)}", f"{frames.dtype}")
-    if photometric == "MINISWHITE" and frames.dtype.kind == "u":
+    if _photometric(page) == "MINISWHITE" and frames.dtype.kind == "u":
         frames = np.iinfo(frames.dtype).max - frames
+    tag = page.tags.get(_ORIENTATION)
     return _upright(frames, int(tag.value) if tag is not None else 1)
 
 
 def write_tiff(path: Path, frames: NDArray[Any]) -> None:
     """Write (T, H, W) or (T, H, W, 3) as an uncompressed multi-page TIFF."""
+    write_tiff_frames(path, frames, frames.shape, frames.dtype)
+
+
+def write_tiff_frames(
+    path: Path,
+    frames: Iterable[NDArray[Any]],
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any],
+) -> None:
+    """Write frames that come one by one; ``shape`` is that of all of them together."""
+    colour = len(shape) == 4
     tifffile.imwrite(
         path,
-        frames,
-        photometric="rgb" if frames.ndim == 4 else "minisblack",
-        metadata={"axes": "TYXS" if frames.ndim == 4 else "TYX"},
+        iter(frames),
+        shape=shape,
+        dtype=dtype,
+        photometric="rgb" if colour else "minisblack",
+        metadata={"axes": "TYXS" if colour else "TYX"},
     )
 
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 import io
 import os
 import re
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ from unsmear._png import SIGNATURE, decode_png16, encode_png16, read_header
 from unsmear._tiff import read_tiff, write_tiff
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -203,9 +204,15 @@ def read_stack(path: Path) -> NDArray[Any]:
         raise ValueError(f"cannot read {str(path)!r}: the file is empty")
     if not is_whole(path):
         raise ValueError(f"cannot read {str(path)!r}: the file is cut off")
-    # What a decoder raises on a broken file is whatever broke; ours says which file.
-    try:
+    with decoding(path):
         return _decode(path)
+
+
+@contextmanager
+def decoding(path: Path) -> Iterator[None]:
+    """Turn what a decoder raises on a broken file into a ValueError naming the file."""
+    try:
+        yield
     except (MemoryError, RecursionError):
         raise
     except Exception as error:
@@ -228,7 +235,7 @@ def _decode(path: Path) -> NDArray[Any]:
     frames: list[NDArray[Any]] = []
     with Image.open(path) as picture:
         for page in ImageSequence.Iterator(picture):
-            frames.append(_samples(page, always_colour=picture.format == "GIF"))
+            frames.append(samples_of_page(page, always_colour=picture.format == "GIF"))
             if describe(frames[-1]) != describe(frames[0]):
                 got = f"{describe(frames[0])} and {describe(frames[-1])}"
                 raise FormatError("pages of one size and type", got)
@@ -237,7 +244,7 @@ def _decode(path: Path) -> NDArray[Any]:
     return np.stack(frames)
 
 
-def _samples(page: Image.Image, *, always_colour: bool) -> NDArray[Any]:
+def samples_of_page(page: Image.Image, *, always_colour: bool) -> NDArray[Any]:
     """Turn one Pillow picture into an array, upright, without palette or alpha."""
     upright = ImageOps.exif_transpose(page) if page.getexif() else page
     if upright.mode.startswith("I"):  # 16 bit grey, or .pgm of that depth in 32 bit

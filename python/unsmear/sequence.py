@@ -146,7 +146,7 @@ def deblur_sequence(
     source = Source(frames, channel_axis)
     wanted = _wanted(indices, source.count)
     pictures, flows, reports = [], [], []
-    settings = _settings(
+    settings = settings_of(
         exposure, noise, flow_method, flow_parameters, joint, seed, source.scale
     )
     for done, (picture, flow, report) in enumerate(
@@ -197,7 +197,7 @@ def restored_frames(
         others.forget_before(index)
 
 
-def _settings(
+def settings_of(
     exposure: float | str,
     noise: float | None,
     flow_method: str,

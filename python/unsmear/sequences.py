@@ -1,9 +1,8 @@
 """Image sequences in and out: folders, globs, lists, stacks and videos.
 
 A sequence is one array (T, H, W) or (T, H, W, 3) in the type its files have: frame t
-is the picture at time t, in frame intervals. Files of a folder or glob are taken in
-natural order, in which numbers inside names count as numbers: frame_2 comes before
-frame_10. All frames must agree in size, channels and type.
+is the picture at time t, in frame intervals. All frames must agree in size, channels
+and type. Where they are found `frame_files` tells.
 
 Pictures are read and written by the rules of `images`, videos by those of `video`.
 """
@@ -12,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,8 +20,8 @@ import numpy as np
 from unsmear._atomic import atomic_path, write_bytes_atomic
 from unsmear._gif import encode_gif
 from unsmear._tiff import write_tiff
+from unsmear.frame_files import Source, is_video, located, natural_key
 from unsmear.images import (
-    PICTURE_SUFFIXES,
     TIFF_SUFFIXES,
     as_integers,
     as_path,
@@ -32,10 +30,10 @@ from unsmear.images import (
     encode_picture,
     read_stack,
 )
-from unsmear.video import READ_SUFFIXES, WRITE_SUFFIXES, read_video, write_video
+from unsmear.video import WRITE_SUFFIXES, read_video, write_video
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -45,8 +43,6 @@ _DEFAULT_FPS = 25.0
 _FEWEST_DIGITS = 4
 _FRAME_NAME = re.compile(r"frame_[0-9]+\.png", re.IGNORECASE)
 _COLOUR_WIDTHS = (3, 4)
-
-Source = str | os.PathLike[str]
 
 
 def read_frames(source: Source | Iterable[Source]) -> NDArray[Any]:
@@ -79,22 +75,8 @@ def read_frames(source: Source | Iterable[Source]) -> NDArray[Any]:
     ImportError
         If a video is given and PyAV is not installed.
     """
-    if isinstance(source, str | os.PathLike):
-        path = as_path(source, "source")
-        if path.is_dir():
-            return _stack_files(_pictures_of_folder(path))
-        if path.exists() or not _is_glob(path):
-            return _read_file(path)
-        matches = _pictures_of_glob(path)
-        return _read_file(matches[0]) if len(matches) == 1 else _stack_files(matches)
-    if not isinstance(source, Iterable):
-        raise TypeError(
-            f"source must be a path or several paths, got {type(source).__name__}"
-        )
-    paths = [as_path(item, "each item of source") for item in source]
-    if not paths:
-        raise ValueError("source must name at least one picture, got an empty list")
-    return _stack_files(paths)
+    files = located(source)
+    return _read_file(files) if isinstance(files, Path) else _stack_files(files)
 
 
 def write_frames(
@@ -133,8 +115,7 @@ def write_frames(
     """
     path = as_path(target, "target")
     suffix = path.suffix.lower()
-    ends_in_slash = os.fspath(target).endswith(("/", os.sep))
-    is_folder = path.is_dir() or ends_in_slash or not suffix
+    is_folder = is_folder_name(target)
     stack = _check_frames(frames)
     timed = not is_folder and suffix not in TIFF_SUFFIXES
     rate = _check_fps(fps, timed=timed)
@@ -148,85 +129,21 @@ def write_frames(
     elif suffix in WRITE_SUFFIXES:
         write_video(path, stack, rate)
     else:
-        known = ", ".join(sorted({".gif", *TIFF_SUFFIXES, *WRITE_SUFFIXES}))
-        raise ValueError(
-            f"target must be a folder or end in one of {known}, got {str(path)!r}"
-        )
-
-
-def natural_key(name: str) -> list[tuple[int, str]]:
-    """Return a sort key in which runs of digits compare as numbers.
-
-    The name itself comes last, so that frame_1 and frame_01 have a fixed order.
-    """
-    parts = re.split(r"([0-9]+)", name.casefold())
-    # Odd parts are digits; equal numbers of digits without leading zeros compare as
-    # text like numbers do, whatever their length.
-    key = [
-        (len(part.lstrip("0")), part.lstrip("0")) if i % 2 else (0, part)
-        for i, part in enumerate(parts)
-    ]
-    return [*key, (0, name)]
-
-
-def _path_key(path: Path) -> list[list[tuple[int, str]]]:
-    return [natural_key(part) for part in path.parts]
-
-
-def _is_glob(path: Path) -> bool:
-    return any(wildcard in str(path) for wildcard in "*?[")
-
-
-def _is_visible_picture(path: Path) -> bool:
-    return (
-        path.suffix.lower() in PICTURE_SUFFIXES
-        and not path.name.startswith(".")
-        and path.is_file()
-    )
-
-
-def _pictures_of_folder(folder: Path) -> list[Path]:
-    files = sorted(folder.iterdir(), key=_path_key)
-    pictures = [path for path in files if _is_visible_picture(path)]
-    if not pictures:
-        names = ", ".join(path.name for path in files[:3]) or "nothing"
-        raise ValueError(
-            f"source must hold pictures ({', '.join(sorted(PICTURE_SUFFIXES))}), "
-            f"got the folder {str(folder)!r} with {names}"
-        )
-    return pictures
-
-
-def _pictures_of_glob(pattern: Path) -> list[Path]:
-    root = Path(pattern.anchor)
-    relative = str(pattern.relative_to(root)) if pattern.anchor else str(pattern)
-    matches = sorted(root.glob(relative), key=_path_key)
-    videos = [p for p in matches if p.suffix.lower() in READ_SUFFIXES and p.is_file()]
-    pictures = [path for path in matches if _is_visible_picture(path)]
-    if not pictures and len(videos) == 1:
-        return videos
-    if not pictures:
-        raise ValueError(
-            f"source must match pictures, got {len(matches)} matches and no picture "
-            f"for the pattern {str(pattern)!r}"
-        )
-    return pictures
+        raise unknown_suffix(path)
 
 
 def _read_file(path: Path) -> NDArray[Any]:
     """Read one file that may hold many frames."""
-    if path.suffix.lower() in READ_SUFFIXES:
-        return read_video(path)
-    return read_stack(path)
+    return read_video(path) if is_video(path) else read_stack(path)
 
 
 def _stack_files(paths: Sequence[Path]) -> NDArray[Any]:
     """Read files of one picture each into one array."""
-    first = _read_single(paths[0])
+    first = read_single(paths[0])
     frames = np.empty((len(paths), *first.shape), first.dtype)
     frames[0] = first
     for t, path in enumerate(paths[1:], start=1):
-        picture = _read_single(path)
+        picture = read_single(path)
         if describe(picture) != describe(first):
             raise ValueError(
                 f"frames must agree in size, channels and type, got {describe(picture)}"
@@ -236,7 +153,8 @@ def _stack_files(paths: Sequence[Path]) -> NDArray[Any]:
     return frames
 
 
-def _read_single(path: Path) -> NDArray[Any]:
+def read_single(path: Path) -> NDArray[Any]:
+    """Read a file of one picture; ValueError where it holds several."""
     stack = read_stack(path)
     if len(stack) != 1:
         raise ValueError(
@@ -244,6 +162,14 @@ def _read_single(path: Path) -> NDArray[Any]:
             f"{str(path)!r}; give that file alone to read it as a stack"
         )
     return np.asarray(stack[0])
+
+
+def unknown_suffix(path: Path) -> ValueError:
+    """Return the error of a target that no writer is for."""
+    known = ", ".join(sorted({".gif", *TIFF_SUFFIXES, *WRITE_SUFFIXES}))
+    return ValueError(
+        f"target must be a folder or end in one of {known}, got {str(path)!r}"
+    )
 
 
 def _check_frames(frames: ArrayLike) -> NDArray[Any]:
@@ -273,15 +199,29 @@ def _check_fps(fps: float | None, *, timed: bool) -> float:
 
 def _write_folder(folder: Path, frames: NDArray[Any]) -> None:
     samples = as_integers(frames, "frames", None)
-    digits = max(_FEWEST_DIGITS, len(str(len(samples) - 1)))
-    names = [f"frame_{t:0{digits}d}.png" for t in range(len(samples))]
     folder.mkdir(parents=True, exist_ok=True)
-    present = {path.name for path in folder.iterdir() if _FRAME_NAME.match(path.name)}
+    names = names_in_folder(folder, len(samples))
+    for name, frame in zip(names, samples, strict=True):
+        write_bytes_atomic(folder / name, encode_picture(frame, "PNG"))
+
+
+def names_in_folder(folder: Path, count: int) -> list[str]:
+    """Return the names of ``count`` frames; ValueError where others would stay."""
+    digits = max(_FEWEST_DIGITS, len(str(count - 1)))
+    names = [f"frame_{t:0{digits}d}.png" for t in range(count)]
+    files = folder.iterdir() if folder.is_dir() else ()
+    present = {path.name for path in files if _FRAME_NAME.match(path.name)}
     stale = sorted(present - set(names), key=natural_key)
     if stale:
         raise ValueError(
             f"target must not hold frames of another sequence, got {str(folder)!r} "
             f"with {stale[0]} and {len(stale) - 1} more; remove them first"
         )
-    for name, frame in zip(names, samples, strict=True):
-        write_bytes_atomic(folder / name, encode_picture(frame, "PNG"))
+    return names
+
+
+def is_folder_name(target: Source) -> bool:
+    """Whether frames written to ``target`` become files of a folder."""
+    path = Path(target)
+    ends_in_slash = os.fspath(target).endswith(("/", os.sep))
+    return path.is_dir() or ends_in_slash or not path.suffix

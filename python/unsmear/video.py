@@ -8,41 +8,36 @@ Written formats
 ---------------
 .mkv .avi   FFV1 (RFC 9043), lossless: what is read equals what was written, 8 and
             16 bit, grey and RGB.
-.mp4 .mov   H.264 (ITU-T H.264), 8 bit, constant rate factor `_H264_QUALITY`; chroma is
+.mp4 .mov   H.264 (ITU-T H.264), 8 bit, constant rate factor `H264_QUALITY`; chroma is
             halved (4:2:0), which every player shows, unless a side is odd (4:4:4).
 """
 
 from __future__ import annotations
 
-import importlib
-import json
-import subprocess
-import sys
-import tempfile
 from fractions import Fraction
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from unsmear._atomic import atomic_path
-from unsmear._containers import is_whole
+from unsmear._video_stream import CONVERSION, VideoStream, require_pyav
 from unsmear.images import as_integers
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
-_LOSSLESS = frozenset({".mkv", ".avi"})
-WRITE_SUFFIXES = _LOSSLESS | {".mp4", ".mov"}
+LOSSLESS_SUFFIXES = frozenset({".mkv", ".avi"})
+WRITE_SUFFIXES = LOSSLESS_SUFFIXES | {".mp4", ".mov"}
 READ_SUFFIXES = WRITE_SUFFIXES | {
     ".m4v", ".3gp", ".webm", ".mpg", ".mpeg", ".wmv", ".flv", ".ts", ".mts", ".m2ts",
     ".ogv", ".y4m",
 }  # fmt: skip
 # Visually lossless; the encoder's own default of 23 blurs the detail this is about.
-_H264_QUALITY = "14"
-_SMPTE_170M = 6  # the BT.601 matrix, by its number in ITU-T H.273
+H264_QUALITY = "14"
+SMPTE_170M = 6  # the BT.601 matrix, by its number in ITU-T H.273
 _LARGEST_DENOMINATOR = 1001  # holds the 30000/1001 of NTSC exactly
-_CHUNK = 1 << 20  # bytes moved at once from the child
 _STANDARD_FORMATS = {  # (channels, bits): samples handed over, samples coded
     (1, 8): ("gray", "gray"),
     (1, 16): ("gray16le", "gray16le"),
@@ -75,41 +70,11 @@ def read_video(path: Path) -> NDArray[Any]:
     ImportError
         If PyAV is not installed.
     """
-    size = path.stat().st_size
-    _require_pyav()
-    if size == 0:
-        raise ValueError(f"cannot read {str(path)!r}: the file is empty")
-    if not is_whole(path):
-        raise ValueError(
-            f"cannot read {str(path)!r} as a video: the file is cut off, its structure "
-            f"promises more than {size} bytes"
-        )
-    # -P keeps this folder off the child's module path, where names of ours could
-    # hide modules of others.
-    script = Path(__file__).with_name("_video_child.py")
-    command = [sys.executable, "-P", str(script), str(path.absolute())]
-    with (
-        tempfile.TemporaryFile() as complaints,
-        subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=complaints,
-            bufsize=0,
-        ) as child,
-    ):
-        try:
-            header, samples = _receive(child)
-        finally:
-            child.kill()  # of no effect once it has ended by itself
-        complaints.seek(0)
-        reason = complaints.read().decode(errors="replace").strip()
-    if child.returncode != 0 or not header:
-        if child.returncode < 0:
-            reason = f"the decoder crashed (signal {-child.returncode})"
-        last = (reason.splitlines() or ["no reason given"])[-1]
-        raise ValueError(f"cannot read {str(path)!r} as a video: {last}")
-    shape, dtype = json.loads(header).values()
+    samples = bytearray()
+    with VideoStream(path) as stream:
+        for _, frame in stream:
+            samples += frame.data
+    shape, dtype = stream.format.shape, stream.format.dtype
     return np.frombuffer(samples, dtype).reshape(-1, *shape)
 
 
@@ -123,8 +88,8 @@ def write_video(path: Path, frames: NDArray[Any], fps: float) -> None:
     ImportError
         If PyAV is not installed.
     """
-    av = _require_pyav()
-    lossless = path.suffix.lower() in _LOSSLESS
+    av = require_pyav()
+    lossless = path.suffix.lower() in LOSSLESS_SUFFIXES
     samples = as_integers(frames, "frames", None if lossless else 8)
     channels = 1 if samples.ndim == 3 else 3
     given, coded = _STANDARD_FORMATS[channels, 8 * samples.dtype.itemsize]
@@ -136,37 +101,16 @@ def write_video(path: Path, frames: NDArray[Any], fps: float) -> None:
         stream = container.add_stream("ffv1" if lossless else "libx264", rate=rate)
         stream.width, stream.height, stream.pix_fmt = width, height, coded
         if not lossless:
-            stream.options = {"crf": _H264_QUALITY}
-            stream.codec_context.colorspace = _SMPTE_170M
+            stream.options = {"crf": H264_QUALITY}
+            stream.codec_context.colorspace = SMPTE_170M
         try:
             for picture in samples:
                 frame = av.VideoFrame.from_ndarray(picture, format=given)
-                container.mux(stream.encode(frame.reformat(format=coded)))
+                coded_frame = frame.reformat(format=coded, interpolation=CONVERSION)
+                container.mux(stream.encode(coded_frame))
             container.mux(stream.encode(None))
         except av.FFmpegError as error:
             raise ValueError(
                 f"frames of {width} x {height} pixels at {fps} per second must suit "
                 f"the encoder of {path.suffix}, got {error}"
             ) from error
-
-
-def _require_pyav() -> Any:
-    try:
-        return importlib.import_module("av")
-    except ImportError:
-        raise ImportError(
-            'videos need PyAV; install it with pip install "unsmear[video]"'
-        ) from None
-
-
-def _receive(child: subprocess.Popen[bytes]) -> tuple[bytes, bytearray]:
-    """Collect header line and samples until the child ends."""
-    output: IO[bytes] | None = child.stdout
-    samples = bytearray()
-    while output is not None and (chunk := output.read(_CHUNK)):
-        samples += chunk
-    child.wait()
-    end = samples.find(b"\n")
-    header = bytes(samples[:end]) if end > 0 else b""
-    del samples[: end + 1]
-    return header, samples

@@ -12,16 +12,15 @@ from unsmear._atomic import write_bytes_atomic
 from unsmear._plain_data import plain_data
 from unsmear._progress import ProgressBar
 from unsmear.cli import _common
-from unsmear.deblur import METHODS, deblur
+from unsmear.deblur import METHODS
 from unsmear.flow_files import read_flow
-from unsmear.sequence import FLOW_METHODS, JOINT, deblur_sequence
-from unsmear.sequences import write_frames
-from unsmear.velocity import velocity_of_frame
+from unsmear.sequence import JOINT
+from unsmear.streaming.deblur_clip import deblur_clip
 
 if TYPE_CHECKING:
     import argparse
 
-    from numpy.typing import NDArray
+    from unsmear.streaming.results import ClipResult
 
 SUMMARY = "remove the motion blur of every frame"
 EXAMPLE = "unsmear deblur clip.mp4 -o sharp/ --report report.html"
@@ -60,35 +59,63 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--flow", help="flow file to use for all frames, not measured")
     verb.add_argument(
-        "--report", metavar="FILE", help="what was found and done; .html or .json"
+        "--report",
+        metavar="FILE",
+        help="what was found and done; .json, or .html with up to 24 of the frames",
+    )
+    verb.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on where a run with the same frames and options was broken off, and "
+        "keep what is finished (in OUT.part) should this one be",
+    )
+    verb.add_argument(
+        "--fps", type=float, help="frames per second of frames without a clock; 25"
+    )
+    verb.add_argument(
+        "--no-audio",
+        dest="audio",
+        action="store_false",
+        help="leave the sound of a video out",
     )
     _common.add_flow_method(verb, "--flow-method", "balanced")
 
 
 def run(options: argparse.Namespace) -> None:
     """Measure, restore and write."""
-    frames = _common.frames_of(options)
+    page = bool(options.report) and not options.report.endswith(".json")
     with ProgressBar("deblur") as bar:
-        if options.method == AUTOMATIC and not options.flow:
-            restored, flows, reports = _whole_chain(options, frames, bar)
-        else:
-            restored, flows, reports = _frame_by_frame(options, frames, bar)
-    write_frames(options.output, restored)
+        made = deblur_clip(
+            options.frames[0] if len(options.frames) == 1 else options.frames,
+            options.output,
+            method=options.method,
+            exposure=options.exposure,
+            flow=read_flow(options.flow) if options.flow else None,
+            flow_method=options.flow_method,
+            joint=options.joint,
+            noise=options.noise,
+            fps=options.fps,
+            audio=options.audio,
+            resume=options.resume,
+            samples=page,
+            progress=bar,
+            **_common.parameters_of(options),
+        )
     if options.report:
-        _write_report(options, frames, restored, flows, reports)
-    warnings = {text for report in reports for text in report.get("warnings", [])}
+        _write_report(options, made)
+    warnings = {text for report in made.reports for text in report.get("warnings", [])}
     result: dict[str, Any] = {
-        "frames": len(frames),
+        "frames": made.count,
         "method": options.method,
-        "exposure": float(np.mean([report["exposure"] for report in reports])),
-        "verdicts": sorted({report["verdict"] for report in reports})
-        if "verdict" in reports[0]
-        else [],
-        "warnings": sorted(warnings),
+        "exposure": float(np.mean([report["exposure"] for report in made.reports])),
+        "verdicts": sorted({r["verdict"] for r in made.reports if "verdict" in r}),
+        "warnings": [*made.warnings, *sorted(warnings)],
         "written": options.output,
     }
+    if options.resume:
+        result["taken up at frame"] = made.taken_up_at
     if options.json:
-        result["reports"] = reports
+        result["reports"] = made.reports
     _common.show_result(result, as_json=options.json)
 
 
@@ -96,97 +123,31 @@ def _exposure(text: str) -> float | str:
     return text if text == AUTOMATIC else float(text)
 
 
-def _whole_chain(
-    options: argparse.Namespace, frames: NDArray[Any], bar: ProgressBar
-) -> tuple[NDArray[Any], list[NDArray[np.float32]], list[dict[str, Any]]]:
-    if len(frames) < 2:
-        msg = "one frame alone shows no motion: give more frames, or --flow"
-        raise ValueError(msg)
-    if options.flow_method not in FLOW_METHODS:
-        names = ", ".join(FLOW_METHODS)
-        msg = (
-            f"--flow-method must be one of {names} for the method auto, "
-            f"got {options.flow_method}"
-        )
-        raise ValueError(msg)
-    result = deblur_sequence(
-        frames,
-        exposure=options.exposure,
-        flow_method=options.flow_method,
-        joint=options.joint,
-        noise=options.noise,
-        channel_axis=_common.channel_axis_of(frames),
-        progress=bar,
-        **_common.parameters_of(options),
-    )
-    return result.frames, list(result.flows), result.reports
-
-
-def _frame_by_frame(
-    options: argparse.Namespace, frames: NDArray[Any], bar: ProgressBar
-) -> tuple[NDArray[Any], list[NDArray[np.float32]], list[dict[str, Any]]]:
-    restored, flows, reports = [], [], []
-    method = "tv" if options.method == AUTOMATIC else options.method
-    for index, frame in enumerate(frames):
-        flows.append(_flow_of(options, frames, index))
-        result = deblur(
-            frame,
-            flows[-1],
-            exposure=options.exposure,
-            method=method,
-            noise=options.noise,
-            channel_axis=2 if frames.ndim == 4 else None,
-        )
-        restored.append(result.image)
-        reports.append(result.report)
-        bar((index + 1) / len(frames))
-    return np.stack(restored), flows, reports
-
-
-def _flow_of(
-    options: argparse.Namespace, frames: NDArray[Any], index: int
-) -> NDArray[np.float32]:
-    if options.flow:
-        return read_flow(options.flow)
-    if len(frames) < 2:
-        msg = "one frame alone shows no motion: give more frames, or --flow"
-        raise ValueError(msg)
-    velocity, _ = velocity_of_frame(
-        frames,
-        index,
-        method=options.flow_method,
-        channel_axis=_common.channel_axis_of(frames),
-        **_common.parameters_of(options),
-    )
-    return velocity
-
-
-def _write_report(
-    options: argparse.Namespace,
-    frames: NDArray[Any],
-    restored: NDArray[Any],
-    flows: list[NDArray[np.float32]],
-    reports: list[dict[str, Any]],
-) -> None:
+def _write_report(options: argparse.Namespace, made: ClipResult) -> None:
     """Write the reports: all of them as JSON, or a page to look at."""
     path = options.report
     if path.endswith(".json"):
-        text = json.dumps(plain_data(reports), indent=2, allow_nan=False)
+        text = json.dumps(plain_data(made.reports), indent=2, allow_nan=False)
         write_bytes_atomic(path, text.encode())
         return
     plot.report(
         path,
-        frames,
-        restored=restored,
-        flows=flows,
-        exposure=float(np.mean([report["exposure"] for report in reports])),
+        np.stack([sample.blurred for sample in made.samples]),
+        restored=np.stack([sample.restored for sample in made.samples]),
+        flows=[sample.flow for sample in made.samples],
+        exposure=float(np.mean([report["exposure"] for report in made.reports])),
         verdicts=[
-            f"frame {number}: {text}"
-            for number, report in enumerate(reports)
-            for text in (report.get("verdict"), *report.get("warnings", ()))
-            if text
+            f"frame {sample.index}: {text}"
+            for sample in made.samples
+            for text in _said_of(made.reports[sample.index])
         ],
-        parameters={"frames": plain_data(reports)},
+        parameters={"frames": plain_data(made.reports)},
         command=options.command,
         title="unsmear deblur",
     )
+
+
+def _said_of(report: dict[str, Any]) -> list[str]:
+    return [
+        text for text in (report.get("verdict"), *report.get("warnings", [])) if text
+    ]

@@ -7,7 +7,7 @@ standard deviation becomes 50 grey levels, that of ordinary photographs of 8 bit
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,6 +27,21 @@ __all__ = ["Source"]
 
 GREY_LEVELS = 255.0
 CONTRAST = 50.0
+
+
+class Frames(Protocol):
+    """Frames (H, W, C) by their index, in memory or read when asked for."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(T, H, W, C)."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the samples."""
+
+    def __getitem__(self, index: int, /) -> NDArray[Any]:
+        """Return a frame."""
 
 
 class Source:
@@ -51,27 +66,42 @@ class Source:
 
     def __init__(self, frames: ArrayLike, channel_axis: int | None) -> None:
         array = as_picture_array(frames, "frames")
-        self._axis = channel_axis
-        self.ceiling: float | None
         if channel_axis is None:
             require_ndim(
                 array, "frames", 3, "(T, H, W) (or say which channel_axis is colour)"
             )
-            self._frames = array[..., np.newaxis]
+            self._take(array[..., np.newaxis], None)
         else:
-            self._frames = move_channels_last(array, channel_axis, "frames")
-            require_ndim(self._frames, "frames", 4, "(T, H, W, C) in any order of axes")
-        self.count = len(self._frames)
-        if self.count < 2 or 0 in array.shape:
-            msg = f"frames must be at least 2 to show motion, got shape {array.shape}"
+            colour = move_channels_last(array, channel_axis, "frames")
+            require_ndim(colour, "frames", 4, "(T, H, W, C) in any order of axes")
+            self._take(colour, channel_axis)
+
+    @classmethod
+    def read_when_needed(cls, frames: Frames) -> Source:
+        """Return the source of frames that are not all in memory, channels last.
+
+        Frames come back as (H, W) if there is one channel.
+        """
+        source = cls.__new__(cls)
+        source._take(frames, None if frames.shape[-1] == 1 else 3)
+        return source
+
+    def _take(self, frames: Frames, axis: int | None) -> None:
+        self._frames = frames
+        self._axis = axis
+        self.count = frames.shape[0]
+        if self.count < 2 or 0 in frames.shape:
+            shape = frames.shape[:-1] if axis is None else frames.shape
+            msg = f"frames must be at least 2 to show motion, got shape {shape}"
             raise ValueError(msg)
-        if array.dtype.kind == "f":
-            known = np.asarray(self._frames[0], np.float64)
+        self.ceiling: float | None
+        if frames.dtype.kind == "f":
+            known = np.asarray(frames[0], np.float64)
             deviation = float(np.std(known[np.isfinite(known)])) if known.size else 0.0
             self.scale = CONTRAST / deviation if deviation > 0 else 1.0
             self.ceiling = None
         else:
-            self.scale = GREY_LEVELS / scale_of(array.dtype)
+            self.scale = GREY_LEVELS / scale_of(frames.dtype)
             self.ceiling = GREY_LEVELS - 0.5
 
     def frame(self, index: int) -> NDArray[Any]:
