@@ -89,7 +89,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
     "show_signature": False,
-    "min_reported_time": 1000,
+    "write_computation_times": False,
     "image_scrapers": ("matplotlib",),
     "reset_modules": ("matplotlib",),
     "matplotlib_animations": False,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
-
 from unsmear.cli import parser
 
 if TYPE_CHECKING:

@@ -73,8 +73,7 @@ def optical_flow(
     index : int, optional
         Frame whose motion (to the next frame) is measured; default ``(T - 1) // 2``.
         Negative values count from the end. "thesis" pools all frames and ignores it.
-    method : {"balanced", "fast", "accurate", "steady", "steady-accurate", \
-"least-squares", "fleet-jepson", "thesis"}
+    method : str, default "balanced"
         - "balanced": two frames, ``index`` and the next, over a pyramid with
           edge-preserving smoothness; any speed, every pixel. The default because it is
           accurate on all kinds of scenes and takes a fraction of a second.
