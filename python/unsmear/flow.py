@@ -13,6 +13,7 @@ from unsmear import _coarse_to_fine, _unsmear
 from unsmear._arrays import as_grey_frames
 from unsmear._parameters import PARAMETERS, merged
 from unsmear._progress import of_steps
+from unsmear.plot import _notebook
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -47,6 +48,9 @@ class FlowResult:
     confidence: NDArray[np.float32]
     valid: NDArray[np.bool_]
     report: dict[str, Any] = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        return _notebook.flow_html(self.flow, self.confidence, self.report)
 
 
 def optical_flow(
