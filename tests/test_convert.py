@@ -96,5 +96,31 @@ def test_values_that_are_no_numbers_are_refused() -> None:
         convert.from_skimage(np.full((2, 3, 3), "a"))
 
 
+class Labelled:
+    """What labelled arrays of other libraries offer NumPy."""
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values = values
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        return np.asarray(self.values, dtype=dtype)
+
+
+def test_arrays_of_other_libraries_pass(flow: np.ndarray) -> None:
+    np.testing.assert_array_equal(
+        convert.to_skimage(Labelled(flow)), convert.to_skimage(flow)
+    )
+    make = unsmear.synthetic
+    frames = make.translation(make.texture((64, 64)), (1, 0), shape=(40, 40)).sharp
+    np.testing.assert_array_equal(
+        unsmear.optical_flow(Labelled(frames)).flow, unsmear.optical_flow(frames).flow
+    )
+    field = np.full((40, 40, 2), (3.0, 1.0))
+    np.testing.assert_array_equal(
+        unsmear.deblur(Labelled(frames[0]), Labelled(field), method="wiener").image,
+        unsmear.deblur(frames[0], field, method="wiener").image,
+    )
+
+
 def test_integers_are_pixels() -> None:
     assert convert.from_skimage(np.full((2, 1, 1), 3)).ravel().tolist() == [3.0, 3.0]

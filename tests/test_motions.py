@@ -160,9 +160,9 @@ def test_the_example_finds_both_motions_and_draws(
 ) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
-    from matplotlib import pyplot
+    from matplotlib import pyplot as plt
 
-    monkeypatch.setattr(pyplot, "show", lambda: None)
+    monkeypatch.setattr(plt, "show", lambda: None)
     example = Path(__file__).parent.parent / "examples" / "plot_two_motions.py"
     there = runpy.run_path(str(example), run_name="__main__")
     panels = [axis for axis in there["figure"].axes if axis.get_title()]
@@ -170,7 +170,7 @@ def test_the_example_finds_both_motions_and_draws(
         "veil: middle frame",
         "edge: middle frame",
     ]
-    pyplot.close("all")
+    plt.close("all")
     found = re.findall(
         r"(veil|edge): \(\s*([-.\d]+),\s*([-.\d]+)\) px", capsys.readouterr().out
     )

@@ -52,7 +52,7 @@ def picture_html(image: NDArray[Any], report: Mapping[str, Any]) -> str:
     """Return a restored picture, and how it was made."""
     rows = {
         "method": report["method"],
-        "exposure": f"{report['exposure']:.3g} frame intervals",
+        "exposure": f"{report['exposure']:.3g} x the frame interval",
         "noise": _number(report.get("noise")),
         "strength of the prior": _number(report.get("regularization")),
         "residual over noise": _number(report.get("mismatch")),
@@ -71,7 +71,7 @@ def clip_html(
     exposures = [report["exposure"] for report in reports]
     rows = {
         "frames": len(frames),
-        "exposure": f"{np.mean(exposures):.3g} frame intervals",
+        "exposure": f"{np.mean(exposures):.3g} x the frame interval",
         "verdict": "; ".join(
             f"{verdicts.count(text)} x {text}" for text in dict.fromkeys(verdicts)
         ),
