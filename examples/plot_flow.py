@@ -13,8 +13,8 @@ scene = unsmear.synthetic.thesis_scene("office", shape=(132, 176), n_frames=5, b
 truth = scene.flow[2]
 
 # %%
-# The default takes two frames. It walks into the room: everything flows away from the
-# middle, near things faster than far ones.
+# The default takes two frames. The camera walks into the room: everything flows away
+# from the middle, near things faster than far ones.
 
 result = unsmear.optical_flow(scene.sharp, index=2)
 errors = unsmear.metrics.flow_errors(result.flow, truth)
