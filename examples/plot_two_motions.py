@@ -1,17 +1,14 @@
-"""Two motions in one place.
-
-    python examples/plot_two_motions.py [PICTURE]
+"""
+Two motions in one place
+========================
 
 Through a half-transparent veil two things are seen at once, and at the edge of an
 object two things share a neighbourhood. One flow vector per pixel cannot say so;
 component velocities can: each allows the velocities on a line, and the lines of each
-thing meet in its velocity. Prints what `unsmear.several_motions` finds beside the truth
-and draws the votes of all lines over the plane of velocities, u to the right, v down;
-red crosses are the truth.
+thing meet in its velocity.
 """
 
-import sys
-
+import matplotlib.pyplot as plt
 import numpy as np
 import unsmear
 
@@ -19,8 +16,6 @@ BACK, FRONT = (1.0, -0.5), (-0.8, 0.9)  # px/frame
 SIZE, AROUND, FRAMES = (64, 64), (120, 120), 15
 SCALES = (0.25, 0.18)  # cycles/px
 REACH = 1.8  # px/frame, half the side of the pictures of votes
-ZOOM = 5
-CROSS, RED = 3, (255, 40, 40)  # px
 
 
 def sequence(opacity: np.ndarray) -> np.ndarray:
@@ -37,42 +32,40 @@ def sequence(opacity: np.ndarray) -> np.ndarray:
     ).sharp
 
 
-def large(panel: np.ndarray, side: int) -> np.ndarray:
-    """Return values 0..1 as 8 bits, ``side`` px wide."""
-    rows, columns = (np.arange(side) * n // side for n in panel.shape)
-    return np.rint(255 * np.clip(panel[np.ix_(rows, columns)], 0, 1)).astype(np.uint8)
+# %%
+# On the left the middle frame, on the right the votes of all lines over the plane of
+# velocities. Circles are the truth, crosses what `unsmear.several_motions` finds, which
+# is not told where either thing is.
 
-
-def main() -> None:
-    """Make both sequences, look at them, draw."""
-    half = np.zeros(AROUND, bool)
-    half[:, AROUND[1] // 2 :] = True
-    side, rows = ZOOM * SIZE[0], []
-    for name, opacity in (("veil", np.full(AROUND, 0.5)), ("edge", half)):
-        frames = sequence(opacity)
-        c = unsmear.component_velocities(
-            frames, temporal="velocity-tuned", tuning_frequency=SCALES
+half = np.zeros(AROUND, bool)
+half[:, AROUND[1] // 2 :] = True
+figure, axes = plt.subplots(2, 2, figsize=(8.4, 7.6), layout="constrained")
+for name, opacity, (left, right) in (
+    ("veil", np.full(AROUND, 0.5), axes[0]),
+    ("edge", half, axes[1]),
+):
+    frames = sequence(opacity)
+    c = unsmear.component_velocities(
+        frames, temporal="velocity-tuned", tuning_frequency=SCALES
+    )
+    votes, axis = unsmear.velocity_votes(c, reach=REACH)
+    left.imshow(frames[FRAMES // 2], cmap="gray")
+    left.set(title=f"{name}: middle frame", xlabel="x, px", ylabel="y, px")
+    image = right.imshow(
+        votes, extent=(axis[0], axis[-1], axis[-1], axis[0]), cmap="viridis"
+    )
+    figure.colorbar(image, label="share of the components", shrink=0.9)
+    for velocity in (BACK, FRONT):
+        right.plot(*velocity, "o", ms=15, mfc="none", mec="white", mew=1.5)
+    for motion in unsmear.several_motions(c):
+        u, v = motion.velocity
+        right.plot(u, v, "rx", ms=8, mew=2)
+        label = f"({u:.2f}, {v:.2f})\n{motion.share:.0%}"
+        right.annotate(
+            label, (u, v), (0, -30), textcoords="offset points", color="w", ha="center"
         )
-        for motion in unsmear.several_motions(c):
-            u, v = motion.velocity
-            print(f"{name}: ({u:5.2f}, {v:5.2f}) px/frame, {motion.share:.0%} of all")
-        votes, axis = unsmear.velocity_votes(c, reach=REACH)
-        panel = np.stack([large(votes / votes.max(), side)] * 3, axis=-1)
-        for u, v in (BACK, FRONT):
-            x, y = (round((s / axis[-1] + 1) / 2 * (side - 1)) for s in (u, v))
-            panel[y - CROSS : y + CROSS + 1, x] = panel[
-                y, x - CROSS : x + CROSS + 1
-            ] = (
-                255,
-                40,
-                40,
-            )
-        picture = np.stack([large(frames[FRAMES // 2], side)] * 3, axis=-1)
-        rows.append(np.concatenate([picture, panel], axis=1))
-    print(f"truth: {BACK} and {FRONT}")
-    if sys.argv[1:]:
-        unsmear.write_image(sys.argv[1], np.concatenate(rows))
-
-
-if __name__ == "__main__":
-    main()
+        print(f"{name}: ({u:5.2f}, {v:5.2f}) px/frame, {motion.share:.0%} of all")
+    right.set(title="votes for each velocity", xlabel="u, px/frame")
+    right.set_ylabel("v, px/frame (down)")
+print(f"truth: {BACK} and {FRONT}")
+plt.show()

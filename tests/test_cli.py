@@ -45,6 +45,8 @@ def test_demo_writes_and_measures(tmp_path: Path, capsys) -> None:
         "report.json",
         "report.html",
     }
+    page = (tmp_path / "demo" / "report.html").read_text("utf-8")
+    assert f"unsmear demo -o {tmp_path / 'demo'} --json" in page, "what repeats it"
     assert unsmear.read_frames(tmp_path / "demo" / "deblurred").shape == (
         5,
         216,

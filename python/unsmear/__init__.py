@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unsmear import metrics, noise, plot, synthetic
+from unsmear import convert, metrics, noise, plot, synthetic
 from unsmear._unsmear import __version__, get_num_threads, set_num_threads
 from unsmear.blur import blur
 from unsmear.component_velocity import ComponentVelocities, component_velocities
@@ -36,6 +36,7 @@ __all__ = [
     "__version__",
     "blur",
     "component_velocities",
+    "convert",
     "deblur",
     "deblur_clip",
     "deblur_sequence",

@@ -11,6 +11,7 @@ from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
 from unsmear._tone import tone_of
 from unsmear.exposure import estimate_exposure
+from unsmear.plot import _notebook
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -46,6 +47,9 @@ class DeblurResult:
 
     image: NDArray[Any]
     report: dict[str, Any]
+
+    def _repr_html_(self) -> str:
+        return _notebook.picture_html(self.image, self.report)
 
 
 def deblur(

@@ -13,6 +13,7 @@ from unsmear import _coarse_to_fine, _unsmear
 from unsmear._arrays import as_grey_frames
 from unsmear._parameters import PARAMETERS, merged
 from unsmear._progress import of_steps
+from unsmear.plot import _notebook
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -48,6 +49,9 @@ class FlowResult:
     valid: NDArray[np.bool_]
     report: dict[str, Any] = field(repr=False)
 
+    def _repr_html_(self) -> str:
+        return _notebook.flow_html(self.flow, self.confidence, self.report)
+
 
 def optical_flow(
     frames: ArrayLike,
@@ -76,8 +80,7 @@ def optical_flow(
     index : int, optional
         Frame whose motion (to the next frame) is measured; default ``(T - 1) // 2``.
         Negative values count from the end. "thesis" pools all frames and ignores it.
-    method : {"balanced", "fast", "accurate", "steady", "steady-accurate", \
-"least-squares", "fleet-jepson", "thesis"}
+    method : str, default "balanced"
         - "balanced": two frames, ``index`` and the next, over a pyramid with
           edge-preserving smoothness; any speed, every pixel. The default because it is
           accurate on all kinds of scenes and takes a fraction of a second.

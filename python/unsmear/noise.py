@@ -12,6 +12,8 @@ from unsmear._deblur_methods import noise_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+__all__ = ["estimate_noise"]
+
 
 def estimate_noise(
     image: ArrayLike,

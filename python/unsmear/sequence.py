@@ -10,6 +10,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear._parameters import merged
+from unsmear.plot import _notebook
 from unsmear.restoration.alternatives import Alternatives
 from unsmear.restoration.passes import Passes
 from unsmear.restoration.records import Settings
@@ -47,6 +48,9 @@ class SequenceResult:
     frames: NDArray[Any]
     flows: NDArray[np.float32]
     reports: list[dict[str, Any]] = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        return _notebook.clip_html(self.frames, self.flows, self.reports)
 
 
 def deblur_sequence(

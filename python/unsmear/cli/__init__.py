@@ -11,8 +11,7 @@ import shlex
 import sys
 from typing import TYPE_CHECKING
 
-from unsmear import __version__
-from unsmear.cli import convert, deblur, demo, evaluate, flow, show
+from unsmear.cli import _about, _completion, convert, deblur, demo, evaluate, flow, show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,13 +20,30 @@ _VERBS = (demo, flow, deblur, evaluate, show, convert)
 _FAILED, _INTERRUPTED = 1, 130
 
 
+class _Version(argparse.Action):
+    """Print what is installed, found out only when asked, and stop."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(_about.about())
+        parser.exit(0)
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of all verbs."""
     top = argparse.ArgumentParser(
         prog="unsmear",
         description="Measure motion in image sequences and remove the blur it leaves.",
     )
-    top.add_argument("--version", action="version", version=f"unsmear {__version__}")
+    top.add_argument(
+        "--version", action=_Version, nargs=0, help="version and what it runs under"
+    )
+    top.add_argument(
+        "--print-completion",
+        action=_completion.PrintCompletion,
+        choices=_completion.SHELLS,
+        metavar="SHELL",
+        help="print the script that completes options: %(choices)s",
+    )
     verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
     for module in _VERBS:
         name = module.__name__.rpartition(".")[2]

@@ -82,7 +82,8 @@ def run(options: argparse.Namespace) -> None:
     report = plain_data({**result, "flow": flow.report, "frames": whole.reports})
     text = json.dumps(report, indent=2, allow_nan=False)
     write_bytes_atomic(folder / "report.json", text.encode())
-    _write_page(folder / "report.html", clip, measured, whole, report)
+    page = folder / "report.html"
+    _write_page(page, clip, measured, whole, report, options.command)
     result["written"] = [str(folder / name) for name in _WRITTEN]
     _common.show_result(result, as_json=options.json)
 
@@ -93,6 +94,7 @@ def _write_page(
     measured: list[FlowResult],
     whole: SequenceResult,
     report: dict[str, Any],
+    command: str,
 ) -> None:
     # The last frame has no next one to move to.
     plot.report(
@@ -106,7 +108,7 @@ def _write_page(
         exposure=clip.exposure,
         verdicts=sorted({str(frame["verdict"]) for frame in whole.reports}),
         parameters=report,
-        command=EXAMPLE,
+        command=command,
         title="unsmear demo",
     )
 
