@@ -1,6 +1,6 @@
 """
-A session on the command line
-=============================
+The command line at work
+========================
 
 What the program does, prints and draws, on three frames of the demo clip. Each call
 below is what one would type; `run` shows it and what came back.

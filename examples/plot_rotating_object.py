@@ -31,9 +31,9 @@ shot = make.layers(
 )
 
 # %%
-# One call. The report says in words what was found and done. (Left to be found, the
-# exposure of so small a thing, whose blur is different everywhere, comes out as
-# "unsure": if you know it, say it.)
+# One call. The report says in words what was found and done. (The exposure of so small
+# a thing, whose blur is different everywhere, is hard to find from the blur: if you
+# know it, say it.)
 
 result = unsmear.deblur_sequence(shot.blurred, indices=[2], exposure=EXPOSURE)
 print("verdict:", result.reports[0]["verdict"])

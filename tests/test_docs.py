@@ -147,6 +147,28 @@ def test_the_reference_leaves_nothing_out() -> None:
     assert public_names() <= shown, f"not shown: {sorted(public_names() - shown)}"
 
 
+def test_the_build_refuses_what_needs_a_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("sphinx", reason="the site's tools are not here")
+    monkeypatch.syspath_prepend(str(DOCS / "_extensions"))
+    import offline
+
+    page, style = tmp_path / "a.html", tmp_path / "a.css"
+    page.write_text(
+        '<a href="https://doi.org/1">read</a> <img src="b.png"> <script src="c.js">'
+        '<link rel="stylesheet" href="_static/d.css">'
+    )
+    assert offline.from_elsewhere(tmp_path) == []
+    page.write_text(
+        '<script async src="https://cdn.example/x.js"></script>'
+        '<link rel="stylesheet" href="//fonts.example/y.css"><img src="http://z/1.png">'
+    )
+    style.write_text("@import url(https://fonts.example/z.css);")
+    found = offline.from_elsewhere(tmp_path)
+    assert len(found) == 4 and found[0].startswith("a.css: ")
+
+
 def test_the_gallery_has_a_place_for_every_example() -> None:
     listed = re.findall(r'^    "(plot_\w+)",$', (DOCS / "conf.py").read_text(), re.M)
     found = {path.stem for path in (ROOT / "examples").glob("*.py")}
