@@ -1,7 +1,5 @@
 """``python -m unsmear``."""
 
-import sys
+from unsmear.cli import entry
 
-from unsmear.cli import main
-
-sys.exit(main())
+entry()

@@ -7,9 +7,10 @@ Exit status: 0 good, 1 failed (the reason is on standard error), 2 wrong usage. 
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from unsmear.cli import _about, _completion, convert, deblur, demo, evaluate, flow, show
 
@@ -78,3 +79,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"unsmear: {error or type(error).__name__}", file=sys.stderr)
         return _FAILED
     return 0
+
+
+def entry() -> NoReturn:
+    """Run the command line and end the process."""
+    status = main()
+    if status == _INTERRUPTED:
+        # All is put away; the interpreter would take as long again over its modules.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)

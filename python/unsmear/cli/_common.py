@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from unsmear._parameters import PARAMETERS, of_pairs
 from unsmear._plain_data import plain_data
-from unsmear.sequences import read_frames
 
 if TYPE_CHECKING:
     import argparse
@@ -23,10 +22,10 @@ def add_frames(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("frames", nargs="+", metavar="FRAMES", help=FRAMES_HELP)
 
 
-def frames_of(options: argparse.Namespace) -> NDArray[Any]:
-    """Read FRAMES; one name may be a folder, a glob, a stack or a video."""
+def source_of(options: argparse.Namespace) -> str | list[str]:
+    """Return FRAMES; one name may be a folder, a glob, a stack or a video."""
     names: list[str] = options.frames
-    return read_frames(names[0] if len(names) == 1 else names)
+    return names[0] if len(names) == 1 else names
 
 
 def channel_axis_of(frames: NDArray[Any]) -> int | None:

@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> None:
     page = bool(options.report) and not options.report.endswith(".json")
     with ProgressBar("deblur") as bar:
         made = deblur_clip(
-            options.frames[0] if len(options.frames) == 1 else options.frames,
+            _common.source_of(options),
             options.output,
             method=options.method,
             exposure=options.exposure,

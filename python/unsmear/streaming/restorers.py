@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
     Restored = tuple[NDArray[Any], NDArray[np.float32], dict[str, Any]]
 
-__all__ = ["by_the_chain", "one_by_one"]
+__all__ = ["by_the_chain", "frames_for_flow", "one_by_one"]
 
 POOLING = ("least-squares", "fleet-jepson", "thesis")
-POOLED_EACH_SIDE = 7
-"""Frames on each side for flow methods that pool all they are given: 15 fill the
-longest of their windows."""
+POOLED = 15
+"""Frames for flow methods that pool all they are given: they fill the longest of their
+windows."""
 
 
 class _WithChannels:
@@ -81,15 +81,14 @@ def one_by_one(
     of `unsmear.deblur`.
     """
     colour = len(clip.shape) == 4
-    reach = POOLED_EACH_SIDE
-    if flow is None and flow_method not in POOLING:
-        reach = 1 + merged(flow_method, flow_parameters)["frames_each_side"]
     for index in range(start, len(clip)):
         velocity = flow
         if velocity is None:
-            first = max(0, index - reach)
+            first, end = frames_for_flow(
+                flow_method, flow_parameters, index, len(clip), POOLED
+            )
             velocity, _ = velocity_of_frame(
-                clip.between(first, index + reach + 1),
+                clip.between(first, end),
                 index - first,
                 method=flow_method,
                 channel_axis=3 if colour else None,
@@ -99,3 +98,17 @@ def one_by_one(
             clip[index], velocity, channel_axis=2 if colour else None, **options
         )
         yield result.image, velocity, result.report
+
+
+def frames_for_flow(
+    method: str, parameters: dict[str, Any], index: int, count: int, pooled: int
+) -> tuple[int, int]:
+    """Return from and up to which frame a method needs to measure flow at ``index``.
+
+    Methods that pool what they are given take ``pooled`` frames of the ``count``.
+    """
+    if method in POOLING:
+        first = max(0, min(index - pooled // 2, count - pooled))
+        return first, min(count, first + pooled)
+    reach = 1 + merged(method, parameters)["frames_each_side"]
+    return max(0, index - reach), min(count, index + reach + 1)
