@@ -172,6 +172,23 @@ def test_a_foreign_frame_is_left_out(series: ExposureSeries) -> None:
     assert error(joint.picture, joint.pad, series) < 1.03 * before
 
 
+def test_equal_channels_are_restored_like_one(series: ExposureSeries) -> None:
+    picture, pad = alone(series)
+    pictures = []
+    for channels in (1, 3):
+        others = [neighbour(series, k) for k in (0, 2)]
+        for one in others:
+            one.planes = np.repeat(one.planes, channels, axis=0)
+        frame = own(series)
+        frame["planes"] = np.repeat(frame["planes"], channels, axis=0)
+        start = np.repeat(picture, channels, axis=0)
+        options = {"strength": STRENGTH, "noise": NOISE, "sharp": True}
+        joint = restore_jointly(frame, others, start, pad, **options)
+        pictures.append(cropped(joint.picture, joint.pad)[-1])
+    # Means over channels round, which a prior that is not convex may amplify.
+    assert np.sqrt(((pictures[0] - pictures[1]) ** 2).mean()) < 0.1
+
+
 def test_without_neighbours_the_frame_is_kept(series: ExposureSeries) -> None:
     picture, pad = alone(series)
     joint = join(series, [])

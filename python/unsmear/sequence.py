@@ -173,7 +173,7 @@ def restored_frames(
 ) -> Iterator[tuple[NDArray[Any], NDArray[np.float32], dict[str, Any]]]:
     """Yield frames one by one, each with its velocity and report.
 
-    Keeps what a window of about ten frames needs, however long the clip is.
+    Keeps what a window of about twenty frames needs, however long the clip is.
     """
 
     def as_given(index: int) -> NDArray[Any]:
