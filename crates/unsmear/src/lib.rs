@@ -44,7 +44,7 @@
 //! | 16 | `exposure::search` | |
 //! | 17 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
-//! | 3 | `motion_operator::lanes` | arithmetic of pixels side by side |
+//! | 3 | `motion_operator::lanes`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
 //! | 4 | `motion_operator::record`, `motion_operator::strands` | |
 //! | 5 | `motion_operator::group` | |
 //! | 6 | `motion_operator::scatter` | |
@@ -53,7 +53,7 @@
 //! | 14 | `motion_operator::expand` | |
 //! | 15 | `motion_operator::sweep` | |
 //! | 16 | [`motion_operator`] | blur along the path of every pixel |
-//! | 13 | `deblur::inverse_kernel`, `deblur::detail`, `deblur::vectors`, `deblur::smoothness`, `deblur::half_size`, `deblur::grey_levels`, `deblur::occlusion`, `deblur::datum` | parts of the deblurring methods |
+//! | 13 | `deblur::inverse_kernel`, `deblur::detail`, `deblur::smoothness`, `deblur::half_size`, `deblur::grey_levels`, `deblur::occlusion`, `deblur::datum` | parts of the deblurring methods |
 //! | 14 | `deblur::wiener`, `deblur::thesis` | two of the methods |
 //! | 14 | `deblur::conjugate_gradient`, `deblur::structure`, `deblur::preparation` | |
 //! | 15 | `deblur::variational` | data and prior, reweighted |

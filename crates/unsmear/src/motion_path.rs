@@ -108,7 +108,8 @@ impl MotionPaths {
     /// is clamped.
     #[must_use]
     pub fn reach(&self) -> usize {
-        let parts: [fn(&FlowField<f32>) -> &Array2<f32>; 2] = [|f| &f.u, |f| &f.v];
+        type Part = fn(&FlowField<f32>) -> &Array2<f32>;
+        let parts: [Part; 2] = [|field| &field.u, |field| &field.v];
         let mut longest = 0.0f32;
         for part in parts {
             let mut offsets = self.offset.as_ref().map(|offset| part(offset).iter());

@@ -94,6 +94,9 @@ impl Strands {
 mod tests {
     use super::*;
 
+    /// dx, dy; range; rows and shifts.
+    type Found = ([i32; 2], usize, Vec<(usize, usize)>);
+
     #[test]
     fn rows_meet_where_they_write() {
         let places = [[-1, 3], [-1, 4], [0, 3], [0, 4], [14, 3], [15, 3], [15, 4]];
@@ -101,7 +104,7 @@ mod tests {
         // Found twice: nothing of the first search may be left.
         found.find(&[[5, 5]]);
         found.find(&places);
-        let strands: Vec<([i32; 2], usize, Vec<(usize, usize)>)> = found
+        let strands: Vec<Found> = found
             .all
             .iter()
             .map(|s| (s.place, s.range, s.taps().iter().map(|t| (t.row(), t.shift())).collect()))
