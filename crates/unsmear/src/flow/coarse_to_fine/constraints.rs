@@ -123,11 +123,14 @@ fn pack(terms: &[f32], units: Units, out: &mut [i16]) {
     }
 }
 
-/// The nearest integers of `values` times `factor`, within `Q`.
+/// The nearest integers of `values` times `factor`, none beyond `Q`.
 #[inline(always)]
 fn nearest(values: &[f32], factor: f32, out: &mut [i16]) {
     for (out, value) in out.iter_mut().zip(values) {
-        *out = (value * factor + ROUND).to_bits() as i16;
+        let scaled = value * factor;
+        let scaled = if scaled < -LARGEST { -LARGEST } else { scaled };
+        let scaled = if scaled > LARGEST { LARGEST } else { scaled };
+        *out = (scaled + ROUND).to_bits() as i16;
     }
 }
 
@@ -156,5 +159,7 @@ mod tests {
             assert!((at(3) * units.root - terms[3][x].sqrt()).abs() < 0.51 * units.root);
         }
         assert!((row[0], row[7], row[14], row[21]) == (0, 1787, 0, 0));
+        let steep = Constraints::of(&[1e9, -7.0, 0.0, 1.0], 1, 1, 5.5);
+        assert_eq!(steep.row(0).0.next().unwrap(), [32767, -32767, 0, 32767]);
     }
 }

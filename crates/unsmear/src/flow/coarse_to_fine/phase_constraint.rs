@@ -33,6 +33,8 @@ const POWER_FLOOR: f32 = 1e-6;
 const SUM_FLOOR: f32 = 1e-9;
 /// Squared deviation of frequency beyond which a constraint is dropped.
 const FARTHEST: f32 = 16.0;
+/// Deviation of frequency that is told apart, rad/px, however far `tau` reaches.
+const STEEPEST: f32 = 16.0;
 
 /// What weights depend on, besides the responses.
 #[derive(Debug, Clone, Copy)]
@@ -74,10 +76,11 @@ impl Filters {
         Self { tuned: tuned.collect(), offset, weighting, height }
     }
 
-    /// Bound of `|G_x|` and `|G_y|`, rad/px: the tuned frequency and the farthest from it that is kept.
+    /// Bound of `|G_x|` and `|G_y|`, rad/px: the tuned frequency and the farthest from it that is kept. Where `tau` is
+    /// so large that it exceeds [`STEEPEST`], steeper slopes, those of phase that jumps, count as that.
     pub(super) fn largest_slope(&self) -> f32 {
         let tuned = self.tuned.iter().map(|([kx, ky], _)| kx.hypot(*ky)).fold(0.0, f32::max);
-        self.offset.abs() * (tuned + (FARTHEST / self.weighting.narrowness).sqrt())
+        self.offset.abs() * (tuned + (FARTHEST / self.weighting.narrowness).sqrt().min(STEEPEST))
     }
 
     /// Fills `out` with the rows `[G_x, G_y, D, W]` of each filter at row `y`, (N, 4, W).
