@@ -136,9 +136,9 @@ def optical_flow(
         ``smoothness=0.13``, ``edge_sensitivity=2.5``, ``strongest_channel=True``,
         ``residual_scale=0.7``, ``precision_scale=0.25``; "steady" by
         ``smoothness=0.088``, ``edge_sensitivity=1.0``, ``residual_scale=0.5``,
-        ``frames_each_side=3``, ``choose_frames=True``; "steady-accurate" from "accurate" by
-        ``smoothness=0.104``, ``edge_sensitivity=1.25``, ``residual_scale=0.35`` and the
-        frames of "steady".
+        ``frames_each_side=3``, ``choose_frames=True``; "steady-accurate" from
+        "accurate" by ``smoothness=0.104``, ``edge_sensitivity=1.25``,
+        ``residual_scale=0.35`` and the frames of "steady".
 
         The others have ``tuning_frequency`` (cycles/px, in (0, 0.5)) and
         ``bandwidth_octaves``.
