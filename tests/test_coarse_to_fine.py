@@ -219,3 +219,16 @@ def test_bad_arguments_are_named(
 ) -> None:
     with pytest.raises(error, match=message):
         unsmear.optical_flow(np.zeros((5, 9, 11)), **given)
+
+
+def test_what_smoothness_filled_in_is_not_trusted() -> None:
+    """Plain faces of boxes: their flow is their outlines', and confidence says so."""
+    scene = unsmear.synthetic.thesis_scene("vcbox", shape=(120, 150), n_frames=3)
+    frames = np.rint(255 * np.clip(scene.sharp, 0, 1)).astype(np.uint8)
+    r = unsmear.optical_flow(frames)
+    windows = np.lib.stride_tricks.sliding_window_view(frames[1], (15, 15))
+    plain = np.ptp(windows, axis=(2, 3)) == 0
+    assert plain.mean() > 0.1
+    # The finest filters reach 3 px and the averages behind them 9.
+    assert r.confidence[7:-7, 7:-7][plain].max() < 0.1
+    assert r.confidence.max() > 0.5

@@ -18,11 +18,11 @@ _BALANCED: dict[str, Any] = {
     "finest_warps": 2,
     "passes": 2,
     "sweeps": 10,
-    "smoothness": 0.1,
+    "smoothness": 0.11,
     "edge_sensitivity": 2.0,
     "strongest_channel": False,
     "residual_scale": 1.0,
-    "precision_scale": 0.25,
+    "precision_scale": 0.3,
     "tau": 1.25,
     "amplitude_fraction": 0.05,
     "amplitude_floor": 0.2,
@@ -44,6 +44,7 @@ _ACCURATE: dict[str, Any] = _BALANCED | {
     "edge_sensitivity": 2.5,
     "strongest_channel": True,
     "residual_scale": 0.7,
+    "precision_scale": 0.25,
 }
 
 _SEVERAL_FRAMES: dict[str, Any] = {"frames_each_side": 3, "choose_frames": True}
@@ -53,7 +54,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "balanced": _BALANCED,
     "accurate": _ACCURATE,
     "steady": _BALANCED
-    | {"smoothness": 0.08, "edge_sensitivity": 1.0, "residual_scale": 0.5}
+    | {"smoothness": 0.088, "edge_sensitivity": 1.0, "residual_scale": 0.5}
     | _SEVERAL_FRAMES,
     "steady-accurate": _ACCURATE
     | {"smoothness": 0.104, "edge_sensitivity": 1.25, "residual_scale": 0.35}

@@ -116,11 +116,11 @@ def optical_flow(
         ``finest_warps=2`` (refinements per level and on the finest, where most is
         known already), ``passes=2`` and ``sweeps=10`` (rounds of reweighting per warp
         and of the solver per round; more changes the error by less than 1 %),
-        ``smoothness=0.1`` (weight against the data; more for noise, less for fine
+        ``smoothness=0.11`` (weight against the data; more for noise, less for fine
         detail), ``edge_sensitivity=2.0`` (how far edges of the picture let the flow
         break; 0 not at all), ``strongest_channel=False`` (edges by the channel that
         shows them best, not the rms of all), ``residual_scale=1.0`` (rad: where a
-        constraint loses half its weight), ``precision_scale=0.25`` (rad: data around
+        constraint loses half its weight), ``precision_scale=0.3`` (rad: data around
         which residuals are smaller count more, by the inverse of their square, so that
         smooth patterns are followed; 0 leaves it out), ``tau=1.25`` (deviations off the
         tuned frequency where weights halve), ``amplitude_fraction=0.05`` (of the rms
@@ -137,11 +137,11 @@ def optical_flow(
         "fast" differs by ``finest_level=1``, ``warps=5``, ``finest_warps=3``;
         "accurate" by ``pyramid_factor=0.75``, ``warps=3``, ``passes=3``, ``sweeps=15``,
         ``smoothness=0.13``, ``edge_sensitivity=2.5``, ``strongest_channel=True``,
-        ``residual_scale=0.7``; "steady" by ``smoothness=0.08``,
-        ``edge_sensitivity=1.0``, ``residual_scale=0.5``, ``frames_each_side=3``,
-        ``choose_frames=True``; "steady-accurate" from "accurate" by
-        ``smoothness=0.104``, ``edge_sensitivity=1.25``, ``residual_scale=0.35`` and the
-        frames of "steady".
+        ``residual_scale=0.7``, ``precision_scale=0.25``; "steady" by
+        ``smoothness=0.088``, ``edge_sensitivity=1.0``, ``residual_scale=0.5``,
+        ``frames_each_side=3``, ``choose_frames=True``; "steady-accurate" from
+        "accurate" by ``smoothness=0.104``, ``edge_sensitivity=1.25``,
+        ``residual_scale=0.35`` and the frames of "steady".
 
         The others have ``tuning_frequency`` (cycles/px, in (0, 0.5)) and
         ``bandwidth_octaves``.

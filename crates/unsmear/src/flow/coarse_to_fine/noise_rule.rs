@@ -65,10 +65,10 @@ mod tests {
 
     #[test]
     fn noise_smooths_and_its_absence_does_not() {
-        assert_eq!(alpha(0.0), 0.1);
-        assert_eq!(alpha(1.8), 0.1, "photographs read as much");
-        // n = 7 within 10 %: s = sqrt(49 - 5.1)/1.4 = 4.7, alpha = 0.1 (1 + 4.7/4).
-        assert!((alpha(7.0) - 0.218).abs() < 0.025, "{}", alpha(7.0));
+        assert_eq!(alpha(0.0), 0.11);
+        assert_eq!(alpha(1.8), 0.11, "photographs read as much");
+        // n = 7 within 10 %: s = sqrt(49 - 5.1)/1.4 = 4.7, alpha = 0.11 (1 + 4.7/4).
+        assert!((alpha(7.0) - 0.239).abs() < 0.025, "{}", alpha(7.0));
         assert!(alpha(20.0) > alpha(10.0));
     }
 }
