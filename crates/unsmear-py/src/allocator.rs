@@ -5,8 +5,8 @@
 //! for a few seconds, long enough for the next frame of a sequence, and then goes back.
 //!
 //! What stays must serve again. Version 2 of the allocator fills the holes between planes of a picture: the process holds
-//! a third more than is in use, the same from call to call. Version 3 spreads such planes over more and more pieces of
-//! 32 MB: two thirds more than is in use at first, and twice as much after some calls.
+//! 35 to 50 % more than is in use, the same from call to call. Version 3 spreads such planes over more and more pieces
+//! of 32 MB: 60 % more than is in use at first, and twice as much after some calls.
 
 use std::ffi::c_long;
 

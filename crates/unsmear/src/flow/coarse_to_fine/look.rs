@@ -2,7 +2,7 @@
 //!
 //! The responses of both frames are made when a row needs them and forgotten when the row after it is done: three rows
 //! of each stay in cache, and nothing of the size of the picture is kept but the warped frame and the weights of its
-//! pixels. Both frames are filtered anew in every look, which costs less than a plane of responses costs to read.
+//! pixels. Both frames are filtered anew in every look: arithmetic instead of memory.
 //!
 //! Bands of [`BAND`] rows are independent of each other, the rows that two of them need are filtered twice, and the
 //! results do not depend on who does which band.
