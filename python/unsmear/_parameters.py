@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 # What each name means and why it has this value is told by `unsmear.optical_flow` and,
 # with the equations, by the core.
@@ -149,3 +153,21 @@ def _as_type_of(default: Any, value: Any, name: str) -> Any:
             msg = f"{name} must be an integer >= 0, got {value!r}"
             raise ValueError(msg)
     return number
+
+
+def of_pairs(pairs: Iterable[str], wanted: str) -> dict[str, Any]:
+    """Return what ``name=value`` pairs say; a value is JSON if it can be, else text.
+
+    ``wanted`` opens the message about one that is no pair: what must look like what.
+    """
+    parameters: dict[str, Any] = {}
+    for pair in pairs:
+        name, separator, text = pair.partition("=")
+        if not separator:
+            msg = f"{wanted}, got {pair!r}"
+            raise ValueError(msg)
+        try:
+            parameters[name] = json.loads(text)
+        except json.JSONDecodeError:
+            parameters[name] = text
+    return parameters

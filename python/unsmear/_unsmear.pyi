@@ -5,7 +5,7 @@ called with steps done and steps expected; what it raises cancels the call.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, TypeAlias, TypedDict, final, overload
+from typing import Any, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,58 +87,22 @@ def coarse_to_fine(
     mask: NDArray[np.bool_] | None = None,
     progress: _Progress | None = None,
 ) -> tuple[_Single, _Single, list[tuple[int, int, int, list[float], float, float]]]: ...
-@overload
+
+# float32 out, or float64 where `double` is asked for.
 def least_squares(
     frames: _Double,
     index: int,
     parameters: _Parameters,
     *,
-    double: Literal[False] = False,
-    progress: _Progress | None = None,
-) -> tuple[_Single, _Single]: ...
-@overload
-def least_squares(
-    frames: _Double,
-    index: int,
-    parameters: _Parameters,
-    *,
-    double: Literal[True],
-    progress: _Progress | None = None,
-) -> tuple[_Double, _Double]: ...
-@overload
-def least_squares(
-    frames: _Double,
-    index: int,
-    parameters: _Parameters,
-    *,
-    double: bool,
+    double: bool = False,
     progress: _Progress | None = None,
 ) -> tuple[NDArray[Any], NDArray[Any]]: ...
-@overload
 def fleet_jepson(
     frames: _Double,
     index: int,
     parameters: _Parameters,
     *,
-    double: Literal[False] = False,
-    progress: _Progress | None = None,
-) -> tuple[_Single, _Single]: ...
-@overload
-def fleet_jepson(
-    frames: _Double,
-    index: int,
-    parameters: _Parameters,
-    *,
-    double: Literal[True],
-    progress: _Progress | None = None,
-) -> tuple[_Double, _Double]: ...
-@overload
-def fleet_jepson(
-    frames: _Double,
-    index: int,
-    parameters: _Parameters,
-    *,
-    double: bool,
+    double: bool = False,
     progress: _Progress | None = None,
 ) -> tuple[NDArray[Any], NDArray[Any]]: ...
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ExposureEstimate", "estimate_exposure"]
 
-LIMITS_OF_IMAGE = (0.4, 2.5)
-LIMITS_OF_CLIP = (0.35, 1.25)
+LIMITS_OF_IMAGE = (0.06, 2.5)
+LIMITS_OF_CLIP = (0.06, 1.25)
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,10 @@ def estimate_exposure(
         Standard deviation of the noise, in the units of ``frames``; >= 0. Default:
         measured; never less than what rounding to 8 bits adds.
     limits : (float, float), optional
-        Least and greatest exposure sought, > 0. Default: 0.35 to 1.25 for several
+        Least and greatest exposure sought, > 0. Default: 0.06 to 1.25 for several
         frames, since a shutter closes before the next frame, with some error of the
-        flow allowed; 0.4 to 2.5 for one picture, whose flow may be in other units.
+        flow allowed; to 2.5 for one picture, whose flow may be in other units. A least
+        one far from 0 makes a sharp picture find a blur that fits it by chance.
     seed : int, default 0
         Of the random choice of tiles; the same seed gives the same result.
     channel_axis : int, optional

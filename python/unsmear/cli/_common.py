@@ -6,7 +6,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from unsmear._parameters import PARAMETERS
+from unsmear._parameters import PARAMETERS, of_pairs
 from unsmear._plain_data import plain_data
 from unsmear.sequences import read_frames
 
@@ -51,17 +51,7 @@ def add_flow_method(verb: argparse.ArgumentParser, option: str, default: str) ->
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
     """Parse NAME=VALUE pairs; a value is JSON if it can be, else text."""
-    parameters = {}
-    for pair in options.parameter:
-        name, separator, text = pair.partition("=")
-        if not separator:
-            msg = f"--parameter must look like NAME=VALUE, got {pair!r}"
-            raise ValueError(msg)
-        try:
-            parameters[name] = json.loads(text)
-        except json.JSONDecodeError:
-            parameters[name] = text
-    return parameters
+    return of_pairs(options.parameter, "--parameter must look like NAME=VALUE")
 
 
 def show_result(result: dict[str, Any], *, as_json: bool) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from unsmear.restoration.chain import Chain
+from unsmear.restoration.clip_exposure import LIMITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,6 +21,8 @@ __all__ = ["Alternatives", "better"]
 
 ALTERNATIVES = (0.7, 1.4)
 """Exposures tried where the search was not sure, relative to the one assumed."""
+AS_GOOD = 1.05
+"""Twins tell exposures apart whose ratios differ by more than this factor."""
 MOST_CHAINS = 4
 
 
@@ -31,7 +35,8 @@ class Alternatives:
     """Shorter and longer exposures, tried where the search for it was not sure.
 
     Twin frames err alike under a wrong exposure and hardly notice a small error of it;
-    half as much again they do.
+    half as much again they do. Of those as good to them as the best the one next to
+    what the search found likeliest is taken.
     """
 
     def __init__(
@@ -48,14 +53,24 @@ class Alternatives:
     def best(
         self, index: int, result: Restored, chain: Chain
     ) -> tuple[Restored, Chain]:
-        """Return the restoration with the least ratio."""
+        """Return the restoration its twins, or the search among equals, speak for."""
         value = result.report["exposure"]
-        best, best_chain = result, chain
+        tried = [(value, result, chain)]
         for factor in ALTERNATIVES:
-            other_chain = self._chain(round(factor * value, 2))
-            other = other_chain.restored(index)
-            if better(other, best):
-                best, best_chain = other, other_chain
+            exposure = round(factor * value, 2)
+            other = self._chain(exposure)
+            restored = other.restored(index)
+            if restored.changed.any():
+                tried.append((exposure, restored, other))
+        limit = AS_GOOD * min(one.ratio for _, one, _ in tried)
+        likeliest = result.report["exposure_found"]["likeliest"]
+        if likeliest is None or not LIMITS[0] < likeliest < LIMITS[1]:
+            _, best, best_chain = min(tried, key=lambda one: one[1].ratio)
+        else:
+            _, best, best_chain = min(
+                (one for one in tried if one[1].ratio <= limit),
+                key=lambda one: abs(math.log(one[0] / likeliest)),
+            )
         if best is not result:
             best.report["exposure_status"] = "unsure"
         return best, best_chain

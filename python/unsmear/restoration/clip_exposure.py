@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ClipExposure", "Exposure"]
 
-LIMITS = (0.35, 2.0)
+LIMITS = (0.06, 2.0)
 LONGEST = 1.25
 """No shutter is open for more than 1; flow too short by a fifth is nothing unusual."""
 POOLED = 1

@@ -7,8 +7,11 @@ neighbours (`twin_frames`),
     ratio = sqrt(mean e(restored) / mean e(blurred)),
 
 used up to a limit that depends on the trust in the exposure, to which the ratio is
-blind. Within a region used, places where the restoration is clearly worse than the
-blurred frame are left out softly,
+blind, and on the blur: neighbours carried by flow with its small errors fit a sharper
+picture worse, so that short blur is used although the ratio is a little above 1; long
+blur only below, for its ringing costs more than it could gain. Within a region used,
+places where the restoration is clearly worse than the blurred frame are left out
+softly,
 
     local(p) = sqrt((G e_x + k E_x) / (G e_b + k E_b)),
 
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 __all__ = ["Verdict", "judge"]
 
 LIMITS = {"given": 1.08, "ok": 1.08, "small": 1.1, "unsure": 0.98, "beyond": 0.9}
+SHORT_BLUR, LONG_BLUR = 3.0, 6.0
+LIMIT_OF_LONG_BLUR = 0.97
 LOCAL_SMOOTHING = 12.0
 REGION_SHARE = 0.5
 LOCAL_LIMIT = (1.15, 1.3)
@@ -73,7 +78,6 @@ def judge(
     known = np.isfinite(own) & np.isfinite(input_)
     labels, count = _unsmear.regions(against.moving)
     share = np.zeros(blurred.shape)
-    limit = LIMITS[status]
     found: list[dict[str, Any]] = []
     for number in range(1, count + 1):
         region = labels == number
@@ -82,21 +86,29 @@ def judge(
             continue
         compared = region & known
         ratio = _ratio(own, input_, compared)
+        limit = _limit(status, float(np.median(blur[region])))
         # Without a neighbour to compare with, only a trusted exposure speaks for it.
         used = ratio <= limit if np.isfinite(ratio) else status in ("given", "ok")
-        found.append({"pixels": pixels, "ratio": _plain(ratio), "used": bool(used)})
+        one = {"pixels": pixels, "ratio": _plain(ratio), "limit": limit}
+        found.append(one | {"used": bool(used)})
         if used:
             share[region] = _locally(own, input_, compared)[region]
     share *= fade
     ratio = _ratio(own, input_, known)
     report = {
         "ratio": _plain(ratio),
-        "limit": limit,
         "regions": sorted(found, key=lambda one: -one["pixels"]),
         "used_share": float((share > 0).mean()),
-        **_words(ratio, found, status, limit),
+        **_words(ratio, found, status),
     }
     return Verdict(share.astype(np.float32), ratio, report)
+
+
+def _limit(status: str, blur: float) -> float:
+    """Return the greatest ratio to use; ``blur`` is the median of a region, px."""
+    limit = LIMITS[status]
+    share = np.clip((blur - SHORT_BLUR) / (LONG_BLUR - SHORT_BLUR), 0.0, 1.0)
+    return round(limit - float(share) * max(limit - LIMIT_OF_LONG_BLUR, 0.0), 3)
 
 
 def _ratio(
@@ -124,17 +136,15 @@ def _locally(
     return np.asarray(np.clip((high - local) / (high - low), 0.0, 1.0))
 
 
-def _words(
-    ratio: float, found: list[dict[str, Any]], status: str, limit: float
-) -> dict[str, Any]:
+def _words(ratio: float, found: list[dict[str, Any]], status: str) -> dict[str, Any]:
     """Say what was found, what to expect and what was done."""
     used = [one for one in found if one["used"]]
     if not found:
         text = "left as is: nothing moves enough to be blurred"
     elif not used:
-        text = (
-            f"left as is: restored frames disagree (ratio {ratio:.2f}, at most {limit})"
-        )
+        limit = max(found, key=lambda one: one["pixels"])["limit"]
+        text = f"left as is: restored frames disagree (ratio {ratio:.2f}, at most "
+        text += f"{limit:.2f})"
         if status == "beyond":
             text += (
                 " and the blur is longer than a shutter makes it: flow must be wrong"

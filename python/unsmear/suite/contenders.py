@@ -10,7 +10,6 @@ two frames, grey.
 from __future__ import annotations
 
 import importlib
-import json
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear._arrays import luma
-from unsmear._parameters import PARAMETERS, merged
+from unsmear._parameters import PARAMETERS, merged, of_pairs
 from unsmear.flow import optical_flow
 
 if TYPE_CHECKING:
@@ -77,16 +76,8 @@ def contender(text: str) -> Contender:
         No such method, or parameters it does not have.
     """
     name, _, rest = text.partition(":")
-    parameters: dict[str, Any] = {}
-    for pair in filter(None, rest.split(",")):
-        key, separator, value = pair.partition("=")
-        if not separator:
-            msg = f"method must look like NAME:parameter=value,..., got {text!r}"
-            raise ValueError(msg)
-        try:
-            parameters[key] = json.loads(value)
-        except json.JSONDecodeError:
-            parameters[key] = value
+    wanted = "method must look like NAME:parameter=value,..."
+    parameters = of_pairs(filter(None, rest.split(",")), wanted)
     if name in RIVALS:
         if parameters:
             msg = f"method {name!r} is run with its library's defaults, got {text!r}"

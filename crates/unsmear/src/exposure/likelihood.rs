@@ -47,8 +47,8 @@ const LEAKAGE: [(f64, f64); 3] = [(0.25, -0.8), (0.5, 0.0), (0.25, 0.8)];
 /// Decay of the scene's power spectrum supposed for the leakage: the mean of [`ALPHA`].
 const LEAKAGE_ALPHA: f64 = 2.5;
 
-/// Steps of Fisher's scoring: from a warm start the strength is then right to 1e-3.
-const STEPS: usize = 5;
+/// Steps of Fisher's scoring from a guess and from the strength for the length before: then right to 1e-3.
+const STEPS: [usize; 2] = [5, 2];
 
 /// Longest step in log c.
 const LONGEST_STEP: f64 = 1.5;
@@ -96,8 +96,11 @@ pub(super) fn curves(
             }
             let floor = (NOISE_FACTORS[shape % NOISE_FACTORS.len()] * noise).powi(2);
             // The strength hardly changes from one length to the next.
-            let start = strengths[shape].unwrap_or_else(|| first_guess(&tile.power, &texture));
-            let (value, strength) = deviance(&tile.power, &texture, floor, start);
+            let (start, steps) = match strengths[shape] {
+                Some(strength) => (strength, STEPS[1]),
+                None => (first_guess(&tile.power, &texture), STEPS[0]),
+            };
+            let (value, strength) = deviance(&tile.power, &texture, floor, start, steps);
             values[shape * scales.len() + index] = value;
             strengths[shape] = Some(strength);
         }
@@ -151,9 +154,9 @@ fn first_guess(power: &[f64], texture: &[f64]) -> f64 {
 }
 
 /// Least -log L over the strength, and that strength.
-fn deviance(power: &[f64], texture: &[f64], floor: f64, start: f64) -> (f64, f64) {
+fn deviance(power: &[f64], texture: &[f64], floor: f64, start: f64, steps: usize) -> (f64, f64) {
     let mut strength = start;
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         let (slope, curvature) = scores(power, texture, floor, strength);
         let step = (slope / curvature.max(f64::MIN_POSITIVE)).clamp(-LONGEST_STEP, LONGEST_STEP);
         strength *= step.exp();
@@ -250,7 +253,7 @@ mod tests {
     fn strength_and_likelihood_equal_their_definitions() {
         let texture: Vec<f64> = (0..101).map(|i| 1.0 / (1.0 + f64::from(i))).collect();
         let power: Vec<f64> = texture.iter().map(|t| 7.0 * t + 0.5).collect();
-        let (value, strength) = deviance(&power, &texture, 0.5, 1.0);
+        let (value, strength) = deviance(&power, &texture, 0.5, 1.0, STEPS[0]);
         // Five steps from a seventh of the truth.
         assert!((strength - 7.0).abs() < 1e-3, "{strength}");
         let direct: f64 = texture

@@ -12,8 +12,9 @@
 //!
 //! s also takes up a common error of scale of the flow: what is found is the blur, s v. Trust: "ok" when 60 % of the
 //! shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
-//! the shapes' optima kept in 0.4 .. 1, for blur assumed too short does little harm and blur assumed too long does
-//! much. Without any tile s is 0.8; "small" says that this is because hardly anything moves by 3 px.
+//! the shapes' optima, 1 at most, for blur assumed too short does little harm and blur assumed too long does much.
+//! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
+//! fits it by chance. Without any tile s is 0.8; "small" says that this is because hardly anything moves by 3 px.
 //!
 //! Validity: noise of known deviation, in the picture's units, white in the band; blur of 2.4 to about 60 px; no
 //! strong sharpening (it fills the zeros). Units: px, frames, rad/px.
@@ -47,8 +48,8 @@ const GREY_LEVELS: f64 = 255.0;
 /// Least vote and greatest spread of an estimate to be relied on.
 const TRUST: (f64, f64) = (0.6, 0.12);
 
-/// Range of s while unsure.
-const UNSURE: (f64, f64) = (0.4, 1.0);
+/// Greatest s while unsure.
+const MOST_UNSURE: f64 = 1.0;
 
 /// s when nothing tells.
 const PRIOR: f64 = 0.8;
@@ -129,7 +130,8 @@ impl ExposureSearch {
         let (value, status) = if credible && agreement >= TRUST.0 && spread <= TRUST.1 {
             (likeliest, ExposureStatus::Ok)
         } else {
-            (median(found.of_shapes).exp().clamp(UNSURE.0, UNSURE.1), ExposureStatus::Unsure)
+            let cautious = median(found.of_shapes).exp().min(MOST_UNSURE).max(self.range.0);
+            (cautious, ExposureStatus::Unsure)
         };
         Ok(ExposureEstimate { value, status, vote: agreement, spread, tiles, likeliest, noise })
     }

@@ -73,7 +73,22 @@ fn says_when_it_cannot_know() {
     // The blur is 1.7 of what the flow says: beyond what a shutter can do.
     let outside = found(&image, &constant(5.2 * 0.6f64.cos(), 5.2 * 0.6f64.sin()), (0.35, 1.25));
     assert_eq!(outside.status, ExposureStatus::Unsure);
-    assert!((UNSURE.0..=UNSURE.1).contains(&outside.value));
+    assert!((0.35..=MOST_UNSURE).contains(&outside.value));
+}
+
+#[test]
+fn a_sharp_picture_is_not_found_to_be_blurred() {
+    // Blurred by 1 px where things move by 20.
+    let image = blurred(1.0, 0.6, 0.5);
+    let flow = constant(20.0 * 0.6f64.cos(), 20.0 * 0.6f64.sin());
+    let still = constant(0.0, 0.0);
+    let frame =
+        ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
+    // The picture is all texture: its noise has to be told.
+    let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1 };
+    let estimate = search.estimate(&[frame], &Control::new()).unwrap();
+    // 2.4 px, where the first zero leaves the band, is all that can be told.
+    assert!(estimate.value * 20.0 < 2.4, "{estimate:?}");
 }
 
 #[test]
