@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 LEAST_MOTION = 0.02
 SHORT = 1.0
 STRAIGHT = 0.1
-MOST_BEND = 0.8
+MOST_BEND = 1.8
 
 
 def kernel(z: Real, cubic: bool) -> Real:
