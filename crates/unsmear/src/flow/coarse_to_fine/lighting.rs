@@ -13,8 +13,9 @@
 //!
 //! Light changes everywhere, motion changes means and deviations only where something comes or goes:
 //! the median over the picture tells one from the other, and `w = 0` says that the light has not
-//! changed. The line of a whole plane, one gain and one offset, takes its mean and deviation over all of it. `G_15 *` is a Gaussian average of deviation 15 px of the frames, taken over cells of 8 px and
-//! interpolated between their centres.
+//! changed. `G_15 *` is a Gaussian average of deviation 15 px of the frames, taken over cells of 8 px and
+//! interpolated between their centres. The line of a whole plane, one gain and one offset, takes its
+//! mean and deviation over all of it.
 //!
 //! Valid for light that changes smoothly over some 30 px; the edge of a moving shadow is a motion.
 //! Reference: E. H. Land, J. J. McCann 1971 (doi 10.1364/JOSA.61.000001): light varies slowly, things do not.
