@@ -119,7 +119,6 @@ def row(case: str, series: ExposureSeries, about: dict[str, Any]) -> dict[str, A
             0,
             strength=report["regularization"] / TV_SHARE,
             noise=max(report["noise"], 0.3),
-            sharp=True,
         )
         picture = cropped(joint.picture, joint.pad)[0]
         line[f"gain, {name} registration"] = round(psnr(picture, truth) - single, 2)

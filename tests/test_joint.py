@@ -59,7 +59,6 @@ def join(series: ExposureSeries, neighbours: list[Neighbour]) -> Any:
         pad,
         strength=STRENGTH,
         noise=NOISE,
-        sharp=True,
     )
 
 
@@ -182,7 +181,7 @@ def test_equal_channels_are_restored_like_one(series: ExposureSeries) -> None:
         frame = own(series)
         frame["planes"] = np.repeat(frame["planes"], channels, axis=0)
         start = np.repeat(picture, channels, axis=0)
-        options = {"strength": STRENGTH, "noise": NOISE, "sharp": True}
+        options = {"strength": STRENGTH, "noise": NOISE}
         joint = restore_jointly(frame, others, start, pad, **options)
         pictures.append(cropped(joint.picture, joint.pad)[-1])
     # Means over channels round, which a prior that is not convex may amplify.

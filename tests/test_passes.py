@@ -32,7 +32,7 @@ class FakeChain:
     def restored(self, _index: int) -> Restored:
         picture = np.full((1, *SHAPE), 10.0 + self.number, np.float32)
         ones = np.ones(SHAPE, np.float32)
-        alone = Alone(np.pad(picture, ((0, 0), (2, 2), (2, 2))), 2, 0.1, True, ones)
+        alone = Alone(np.pad(picture, ((0, 0), (2, 2), (2, 2))), 2, 0.1, ones)
         changed = np.full(SHAPE, self.used)
         came = np.zeros((1, *SHAPE), np.float32)
         return Restored(came, changed, self.ratios[self.number], {}, alone)

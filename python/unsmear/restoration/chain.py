@@ -211,7 +211,7 @@ class Chain:
             "sharp": sharp,
             **verdict.report,
         }
-        alone = Alone(single, pad, strength, sharp, verdict.share)
+        alone = Alone(single, pad, strength, verdict.share)
         restored = cropped(single, pad)
         return self._composed(planes, restored, alone, report, verdict.ratio)
 

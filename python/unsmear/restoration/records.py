@@ -38,8 +38,6 @@ class Alone:
         Of the picture.
     strength : float
         lambda of total variation, grey levels.
-    sharp : bool
-        Whether the sharper prior was better.
     share : ndarray of shape (H, W), float32
         Of the restoration in the result.
     """
@@ -47,7 +45,6 @@ class Alone:
     picture: Planes
     pad: int
     strength: float
-    sharp: bool
     share: Planes
 
 

@@ -89,7 +89,6 @@ class SeveralFrames:
             alone.pad,
             strength=alone.strength,
             noise=self._noise(index),
-            sharp=alone.sharp,
         )
         return joint, registered
 
