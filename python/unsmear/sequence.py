@@ -88,7 +88,7 @@ def deblur_sequence(
         See `unsmear.optical_flow`, which takes ``flow_parameters``.
     joint : {1, 3}, default 1
         Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
-        come out 1 to 2 dB better, frames blurred in different directions more (4.7 dB
+        come out .5 to 3 dB better, frames blurred in different directions more (4.7 dB
         where their blur is known), and with less flicker than as they came; in half as
         much time again for a whole clip.
     second_pass : bool, optional
