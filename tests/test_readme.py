@@ -22,6 +22,8 @@ MODULES = (
     "plot.flow_pictures",
     "psf",
     "sequence",
+    "streaming.clip",
+    "streaming.deblur_clip",
 )
 
 
