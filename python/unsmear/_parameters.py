@@ -51,7 +51,7 @@ _SEVERAL_FRAMES: dict[str, Any] = {"frames_each_side": 3, "choose_frames": True}
 
 PARAMETERS: dict[str, dict[str, Any]] = {
     "fast": _BALANCED
-    | {"finest_level": 1, "warps": 5, "finest_warps": 3, "smoothness": 0.1},
+    | {"finest_level": 1, "warps": 4, "finest_warps": 3, "smoothness": 0.1},
     "balanced": _BALANCED,
     "accurate": _ACCURATE,
     "steady": _BALANCED

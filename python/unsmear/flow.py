@@ -134,7 +134,7 @@ def optical_flow(
         ``forward_backward=False`` (lower the confidence where the flow of the reversed
         frames does not lead back: ranks errors 2 % better at twice the time).
 
-        "fast" differs by ``finest_level=1``, ``warps=5``, ``finest_warps=3``,
+        "fast" differs by ``finest_level=1``, ``warps=4``, ``finest_warps=3``,
         ``smoothness=0.1``;
         "accurate" by ``pyramid_factor=0.75``, ``warps=3``, ``passes=3``, ``sweeps=15``,
         ``smoothness=0.13``, ``edge_sensitivity=2.5``, ``strongest_channel=True``,
