@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unsmear.synthetic.eight_bits import in_eight_bits
 from unsmear.synthetic.motion import flowing, rotating, translating, zooming
 from unsmear.synthetic.scene import Layer, Scene
 from unsmear.synthetic.sequence import record
@@ -52,7 +53,6 @@ _LAYERS = (13.0, 3.6)  # px, background and disc
 _DISC = 0.28  # of the window's shorter side, radius
 # Half step of second differences, frames: rounding and truncation are both below 1e-6.
 _STEP = 1e-3
-_WHITE = 255.0
 
 
 @dataclass(frozen=True)
@@ -82,15 +82,7 @@ class BlurCase:
 
     def with_noise(self, noise: float, seed: int = 0) -> BlurCase:
         """Return the case with other noise, standard deviation in grey levels."""
-        if not 0 <= noise < math.inf:
-            msg = f"noise must be >= 0 grey levels, got {noise}"
-            raise ValueError(msg)
-        grain = np.random.default_rng(seed).normal(scale=noise, size=self.exposed.shape)
-        return replace(self, blurred=_rounded(_WHITE * self.exposed + grain))
-
-
-def _rounded(levels: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return np.rint(np.clip(levels, 0, _WHITE)).astype(np.uint8)
+        return replace(self, blurred=in_eight_bits(self.exposed, noise, seed))
 
 
 def blur_case(
@@ -147,8 +139,8 @@ def blur_case(
     scene = _scene(name, picture, shape, direction, behind)
     s = record(scene, n_frames=1, exposure=1.0, n_subframes=n_subframes)
     return BlurCase(
-        sharp=_rounded(_WHITE * s.sharp[0]),
-        blurred=_rounded(_WHITE * s.blurred[0]),
+        sharp=in_eight_bits(s.sharp[0]),
+        blurred=in_eight_bits(s.blurred[0]),
         exposed=s.blurred[0],
         velocity=s.velocity[0],
         acceleration=scene.acceleration(0.0, _STEP).astype(np.float32),

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unsmear.synthetic.eight_bits import in_eight_bits
 from unsmear.synthetic.scene import Layer, Scene
 from unsmear.synthetic.sequence import record
 
@@ -33,7 +34,6 @@ __all__ = ["ExposureSeries", "exposure_series"]
 _POSE = (2.7, -140.0, 0.7)
 """Shift of the exposure after the middle one, px, its direction and the turn, degrees;
 the others lie on the same line, those before on the other side."""
-_WHITE = 255.0
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,7 @@ class ExposureSeries:
 
     def with_noise(self, noise: float, seed: int = 0) -> ExposureSeries:
         """Return the series with other noise, standard deviation in grey levels."""
-        if not 0 <= noise < math.inf:
-            msg = f"noise must be >= 0 grey levels, got {noise}"
-            raise ValueError(msg)
-        grain = np.random.default_rng(seed).normal(scale=noise, size=self.exposed.shape)
-        return replace(self, blurred=_rounded(_WHITE * self.exposed + grain))
+        return replace(self, blurred=in_eight_bits(self.exposed, noise, seed))
 
 
 def exposure_series(
@@ -135,8 +131,8 @@ def exposure_series(
     offset = np.stack([scene.displacement(t, 0.0)[0] for t in times])
     way = np.stack([scene.displacement(0.0, t)[0] for t in times])
     return ExposureSeries(
-        sharp=_rounded(_WHITE * s.sharp),
-        blurred=_rounded(_WHITE * s.blurred),
+        sharp=in_eight_bits(s.sharp),
+        blurred=in_eight_bits(s.blurred),
         exposed=s.blurred,
         velocity=s.velocity,
         offset=offset.astype(np.float32),
@@ -161,7 +157,3 @@ def _series(directions: list[float], lengths: list[float]) -> Motion:
 def _unit(degrees: float) -> NDArray[np.float64]:
     angle = math.radians(degrees)
     return np.array([math.cos(angle), math.sin(angle)])
-
-
-def _rounded(levels: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return np.rint(np.clip(levels, 0, _WHITE)).astype(np.uint8)
