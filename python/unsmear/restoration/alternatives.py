@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from unsmear.restoration.chain import Chain
-from unsmear.restoration.clip_exposure import LIMITS
+from unsmear.restoration.clip_exposure import LIMITS, LONGEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,7 +36,8 @@ class Alternatives:
 
     Twin frames err alike under a wrong exposure and hardly notice a small error of it;
     half as much again they do. Of those as good to them as the best the one next to
-    what the search found likeliest is taken.
+    what the search found likeliest is taken. An exposure longer than a shutter makes it
+    is tried only where the search found one.
     """
 
     def __init__(
@@ -55,16 +56,19 @@ class Alternatives:
     ) -> tuple[Restored, Chain]:
         """Return the restoration its twins, or the search among equals, speak for."""
         value = result.report["exposure"]
+        likeliest = result.report["exposure_found"]["likeliest"]
+        found = likeliest is not None and LIMITS[0] < likeliest < LIMITS[1]
         tried = [(value, result, chain)]
         for factor in ALTERNATIVES:
             exposure = round(factor * value, 2)
+            if exposure > LONGEST and not (found and likeliest > LONGEST):
+                continue
             other = self._chain(exposure)
             restored = other.restored(index)
             if restored.changed.any():
                 tried.append((exposure, restored, other))
         limit = AS_GOOD * min(one.ratio for _, one, _ in tried)
-        likeliest = result.report["exposure_found"]["likeliest"]
-        if likeliest is None or not LIMITS[0] < likeliest < LIMITS[1]:
+        if not found:
             _, best, best_chain = min(tried, key=lambda one: one[1].ratio)
         else:
             _, best, best_chain = min(

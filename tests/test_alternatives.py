@@ -1,0 +1,63 @@
+"""Which exposure is taken where the search for it was not sure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from unsmear.restoration import alternatives as module
+from unsmear.restoration.alternatives import Alternatives
+from unsmear.restoration.records import Restored, Settings
+
+SETTINGS = Settings(None, None, "balanced", {}, 1, 0)
+
+
+def frame(ratio: float, exposure: float, likeliest: float | None = None) -> Restored:
+    report: dict[str, Any] = {
+        "exposure": exposure,
+        "exposure_status": "unsure",
+        "exposure_found": {"likeliest": likeliest},
+    }
+    changed, planes = np.ones((2, 2), bool), np.zeros((1, 2, 2), np.float32)
+    return Restored(planes, changed, ratio, report)
+
+
+@pytest.mark.parametrize(
+    ("ratios", "likeliest", "expected"),
+    [
+        # What no shutter does is not tried unless the search found it.
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.50}, None, 1.0),
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.50}, 2.34, 1.0),
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.50}, 0.9, 1.0),
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.50}, 1.8, 1.4),
+        # Of ratios within 5 % the one next to what the search found.
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.69}, 1.8, 1.4),
+        ({0.7: 0.92, 1.0: 0.68, 1.4: 0.75}, 1.8, 1.0),
+        ({0.7: 0.69, 1.0: 0.68, 1.4: 0.69}, 0.6, 0.7),
+        # Without its word the least ratio.
+        ({0.7: 0.60, 1.0: 0.61, 1.4: 0.69}, None, 0.7),
+    ],
+)
+def test_ratios_and_the_search_decide(
+    monkeypatch: pytest.MonkeyPatch,
+    ratios: dict[float, float],
+    likeliest: float | None,
+    expected: float,
+) -> None:
+    class Chain:
+        def __init__(self, _source: Any, _guide: Any, settings: Settings) -> None:
+            assert settings.exposure is not None
+            self.exposure = settings.exposure
+
+        def restored(self, _index: int) -> Restored:
+            return frame(ratios[self.exposure], self.exposure)
+
+    monkeypatch.setattr(module, "Chain", Chain)
+    source: Any = None
+    others = Alternatives(source, lambda index: np.zeros(index), SETTINGS)
+    own: Any = Chain(None, None, Settings(1.0, None, "balanced", {}, 1, 0))
+    best, chain = others.best(0, frame(ratios[1.0], 1.0, likeliest), own)
+    assert best.report["exposure"] == expected
+    assert best.report["exposure_status"] == "unsure"
+    assert (chain is own) == (expected == 1.0)
