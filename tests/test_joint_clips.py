@@ -127,3 +127,19 @@ def test_agreement_leaves_out_what_differs() -> None:
     assert np.abs(mean[0, :, :20]).max() < 1e-6
     # Of 100 grey levels w / (1 + w) is left, w = (64 / (64 + 100^2))^2.
     assert 0 < mean[0, :, 40:].max() < 0.01
+
+
+def test_what_is_hardly_blurred_is_restored_by_itself() -> None:
+    clip = synthetic.translation(
+        synthetic.texture((140, 140), seed=6, exponent=1.2),
+        (1.6, 0.5),
+        shape=(96, 96),
+        n_frames=3,
+        noise=1.0,
+        bits=8,
+    )
+    alone, joint = (
+        unsmear.deblur_sequence(clip.blurred, indices=[1], joint=n) for n in (1, 3)
+    )
+    assert alone.reports[0]["exposure_status"] == "small"
+    np.testing.assert_array_equal(joint.frames, alone.frames)

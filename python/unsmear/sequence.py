@@ -90,7 +90,8 @@ def deblur_sequence(
         Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
         come out .5 to 3 dB better, frames blurred in different directions more (4.7 dB
         where their blur is known), and with less flicker than as they came; in half as
-        much time again for a whole clip.
+        much time again for a whole clip. Frames blurred by less than about 3 px are
+        restored by themselves.
     second_pass : bool, optional
         Measure flow again on restored frames, up to three passes in all, as long as
         restored frames agree better. Default: for frames whose acceleration exceeds a
