@@ -67,8 +67,8 @@ impl SorScratch {
 /// Runs `sweeps` sweeps with relaxation `omega` on (`u`, `v`) in place; see the [module](self).
 ///
 /// # Errors
-/// [`Error::Shape`](crate::Error::Shape) when a slice has not height x width samples; [`Error::Value`](crate::Error::Value) for omega outside (0, 2);
-/// [`Error::Cancelled`](crate::Error::Cancelled), after which (`u`, `v`) are as before.
+/// [`Error::Shape`] when a slice has not height x width samples; [`Error::Value`] for omega outside (0, 2);
+/// [`Error::Cancelled`], after which (`u`, `v`) are as before.
 pub fn solve(
     system: &SorSystem<'_>,
     u: &mut [f32],
@@ -85,7 +85,7 @@ pub fn solve(
 /// Like [`solve`], with equations made row by row for a picture of `[height, width]`.
 ///
 /// # Errors
-/// [`Error::Shape`](crate::Error::Shape) when `u` or `v` has not height x width samples; else as [`solve`].
+/// [`Error::Shape`] when `u` or `v` has not height x width samples; else as [`solve`].
 pub fn solve_rows(
     system: &impl SystemRows,
     [height, width]: [usize; 2],
