@@ -58,6 +58,11 @@ def angular_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     flow, truth : array_like of shape (H, W, 2)
         px/frame; NaN = unknown.
 
+    Returns
+    -------
+    ndarray of shape (H, W), float64
+        NaN where flow or truth is unknown.
+
     Raises
     ------
     ValueError
@@ -69,8 +74,8 @@ def angular_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
 def direction_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     """Return the plain angle between ``(u, v)`` and the truth's, degrees, (H, W).
 
-    In [0, 180]; NaN also where either vector is 0 and has no direction. Parameters and
-    errors as `angular_error`.
+    In [0, 180]; NaN also where either vector is 0 and has no direction. Parameters,
+    unknown pixels and errors as `angular_error`.
     """
     return _map("direction", flow, truth)
 
@@ -78,7 +83,7 @@ def direction_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
 def endpoint_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     """Return ``hypot(u - u_true, v - v_true)``, px/frame, (H, W).
 
-    Parameters and errors as `angular_error`.
+    Parameters, unknown pixels and errors as `angular_error`.
     """
     return _map("endpoint", flow, truth)
 
@@ -86,7 +91,7 @@ def endpoint_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
 def magnitude_error(flow: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
     """Return the absolute difference of the speeds, px/frame, (H, W).
 
-    Parameters and errors as `angular_error`.
+    Parameters, unknown pixels and errors as `angular_error`.
     """
     return _map("magnitude", flow, truth)
 

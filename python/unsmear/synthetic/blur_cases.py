@@ -81,7 +81,7 @@ class BlurCase:
     mixed: NDArray[np.bool_]
 
     def with_noise(self, noise: float, seed: int = 0) -> BlurCase:
-        """Return the case with other noise, standard deviation in grey levels."""
+        """Return the case with other noise, deviation in grey levels, >= 0."""
         return replace(self, blurred=in_eight_bits(self.exposed, noise, seed))
 
 

@@ -62,7 +62,7 @@ class ExposureSeries:
     way: NDArray[np.float32]
 
     def with_noise(self, noise: float, seed: int = 0) -> ExposureSeries:
-        """Return the series with other noise, standard deviation in grey levels."""
+        """Return the series with other noise, deviation in grey levels, >= 0."""
         return replace(self, blurred=in_eight_bits(self.exposed, noise, seed))
 
 
