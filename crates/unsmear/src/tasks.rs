@@ -135,7 +135,11 @@ pub(crate) fn cut<'a, T>(
 
 /// `samples` times `value`, written by all threads.
 pub(crate) fn filled<T: Copy + Send + Sync>(value: T, samples: usize) -> Vec<T> {
-    made(samples, |_| [value; AT_ONCE])
+    if rayon::current_num_threads() == 1 {
+        vec![value; samples]
+    } else {
+        made(samples, |_| [value; AT_ONCE])
+    }
 }
 
 /// Makes all of `values` `value`, by all threads.
@@ -152,6 +156,9 @@ pub(crate) fn filled_picture<T: Copy + Send + Sync>(value: T, size: (usize, usiz
 /// A copy made by all threads.
 pub(crate) fn copied<T: Copy + Send + Sync>(values: &[T]) -> Vec<T> {
     let Some(&last) = values.last() else { return Vec::new() };
+    if rayon::current_num_threads() == 1 {
+        return values.to_vec();
+    }
     let (whole, rest) = values.as_chunks::<AT_ONCE>();
     let mut end = [last; AT_ONCE];
     end[..rest.len()].copy_from_slice(rest);

@@ -13,6 +13,7 @@
 //! things that move far are missed. Frames beyond two assume constant motion.
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
 
+use multiversion::multiversion;
 use ndarray::{Array2, s};
 
 use crate::awake::awake;
@@ -251,13 +252,21 @@ fn descend(summit: &Summit, size: (usize, usize), control: &Control) -> Result<E
     let evidence = larger(&summit.evidence)?;
     let planes = [&mut flow.u, &mut flow.v, &mut confidence]
         .map(|plane| plane.as_slice_mut().unwrap_or_default());
+    let evidence = evidence.as_slice().unwrap_or_default();
     for_each_rows(planes, [size.1; 3], control, |y, [u, v, c]| {
-        for (x, &e) in evidence.row(y).iter().enumerate() {
-            let known = e >= LEAST_EVIDENCE;
-            u[x] = if known { u[x] } else { f32::NAN };
-            v[x] = if known { v[x] } else { f32::NAN };
-            c[x] = if known { c[x].clamp(LEAST_CONFIDENCE, 1.0) } else { 0.0 };
-        }
+        keep_known(&evidence[y * size.1..(y + 1) * size.1], u, v, c);
     })?;
     Ok(Estimate { flow, confidence })
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn keep_known(evidence: &[f32], u: &mut [f32], v: &mut [f32], confidence: &mut [f32]) {
+    let n = evidence.len();
+    let (u, v, confidence) = (&mut u[..n], &mut v[..n], &mut confidence[..n]);
+    for x in 0..n {
+        let known = evidence[x] >= LEAST_EVIDENCE;
+        u[x] = if known { u[x] } else { f32::NAN };
+        v[x] = if known { v[x] } else { f32::NAN };
+        confidence[x] = if known { confidence[x].clamp(LEAST_CONFIDENCE, 1.0) } else { 0.0 };
+    }
 }
