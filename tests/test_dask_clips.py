@@ -1,0 +1,224 @@
+"""Clips over a cluster: the same bytes as alone, whatever dies, and nothing left over."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import unsmear
+from unsmear import synthetic
+from unsmear.cli import main
+
+distributed = pytest.importorskip("distributed", reason="dask.distributed is not here")
+import dask  # noqa: E402
+import unsmear.dask  # noqa: E402
+
+COUNT = 8
+SHAPE = (40, 56)
+GIVEN: dict[str, Any] = {
+    "method": "wiener",
+    "exposure": 0.8,
+    "noise": 1.0,
+    "flow": np.full((*SHAPE, 2), (4, 2), np.float32),
+}
+PATIENCE = 120.0
+"""Seconds after which what does not come will not."""
+
+
+def folder_of_clips(folder: Path, names: tuple[str, ...], count: int = COUNT) -> Path:
+    folder.mkdir()
+    for seed, name in enumerate(names):
+        made = synthetic.translation(
+            synthetic.texture((130, 130), seed=seed),
+            (4.0, 2.0),
+            shape=SHAPE,
+            exposure=0.8,
+            n_frames=count,
+            noise=1.0,
+            bits=8,
+        )
+        unsmear.write_frames(folder / name, made.blurred)
+    return folder
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    """A cluster of two processes on this machine."""
+    with (
+        dask.config.set({"distributed.worker.daemon": False}),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as connected,
+    ):
+        yield connected
+
+
+def test_a_killed_worker_loses_nothing(tmp_path: Path, client: Any) -> None:
+    names = ("a.tif", "b.tif", "c.tif", "d.tif")
+    clips = folder_of_clips(tmp_path / "clips", names)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "out").mkdir()
+    for name in names:
+        unsmear.deblur_clip(clips / name, tmp_path / "alone" / name, **GIVEN)
+
+    def die_at_the_third_frame(dask_worker: Any = None) -> int:
+        """Make a worker kill itself in the middle of its first clip."""
+        from unsmear.streaming.part_folder import PartFolder
+
+        add = PartFolder.add
+
+        def add_and_die(part: Any, *frame: Any) -> None:
+            add(part, *frame)
+            if part.done == 3:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        PartFolder.add = add_and_die  # type: ignore[method-assign]
+        return os.getpid()
+
+    first = next(iter(client.scheduler_info()["workers"]))
+    doomed = client.run(die_at_the_third_frame, workers=[first])[first]
+    shares: dict[int, float] = {}
+    outcomes = list(
+        unsmear.dask.deblur_clips(
+            [(str(clips / name), str(tmp_path / "out" / name)) for name in names],
+            scheduler=client,
+            progress=shares.__setitem__,
+            **GIVEN,
+        )
+    )
+    assert [outcome.error for outcome in outcomes] == [None] * len(names)
+    assert sorted(outcome.number for outcome in outcomes) == [0, 1, 2, 3]
+    taken_up = [outcome.result.taken_up_at for outcome in outcomes]
+    assert sorted(taken_up) == [0, 0, 0, 3], "taken up where the dead one left it"
+    assert bytes_of(tmp_path / "out") == bytes_of(tmp_path / "alone")
+    assert doomed not in client.run(os.getpid).values(), "it was killed indeed"
+    assert shares and max(shares.values()) <= 1
+
+
+def test_one_bad_clip_spoils_no_other(tmp_path: Path, client: Any) -> None:
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif", "b.tif"))
+    (clips / "b.tif").write_bytes(b"")
+    jobs = [(str(clips / name), str(tmp_path / name)) for name in ("a.tif", "b.tif")]
+    outcomes = {
+        outcome.number: outcome
+        for outcome in unsmear.dask.deblur_clips(jobs, scheduler=client, **GIVEN)
+    }
+    assert outcomes[0].error is None and outcomes[0].result.count == COUNT
+    assert outcomes[1].result is None and "the file is empty" in outcomes[1].error
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.tif", "clips"]
+
+
+def test_workers_share_the_processors(client: Any) -> None:
+    def threads() -> int:
+        from unsmear.dask.cores import share_cores
+
+        share_cores()
+        return unsmear.get_num_threads()
+
+    assert set(client.run(threads).values()) == {1}
+    before = unsmear.get_num_threads()
+    unsmear.dask.cores.share_cores()
+    assert unsmear.get_num_threads() == before, "nothing changes beside a cluster"
+
+
+def test_arrays_over_processes(client: Any) -> None:
+    import dask.array as da
+
+    frames = np.random.default_rng(0).random((4, *SHAPE))
+    stack = da.from_array(frames, chunks=(2, *SHAPE))
+    lazy = unsmear.dask.deblur(stack, GIVEN["flow"], method="wiener", noise=0.01)
+    made = lazy.frames.compute()
+    for before, after in zip(frames, made, strict=True):
+        alone = unsmear.deblur(before, GIVEN["flow"], method="wiener", noise=0.01)
+        np.testing.assert_array_equal(after, alone.image)
+
+
+def wait_for(what: Any) -> None:
+    end = time.monotonic() + PATIENCE
+    while not what():
+        assert time.monotonic() < end, "it does not come"
+        time.sleep(0.02)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are those of POSIX")
+@pytest.mark.parametrize("resume", [True, False])
+def test_an_interrupted_run_leaves_what_can_be_taken_up(
+    tmp_path: Path, client: Any, resume: bool
+) -> None:
+    """Ctrl-C at the client of a cluster that goes on."""
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif", "b.tif", "c.tif"), 400)
+    unsmear.write_flow(tmp_path / "flow.flo", GIVEN["flow"])
+    out = tmp_path / "out"
+    options = ["--flow", str(tmp_path / "flow.flo"), "--method", "wiener"]
+    options += ["--noise", "1", "--exposure", "0.8"]
+    command = ["deblur", str(clips / "*.tif"), "--each", "-o", str(out), *options]
+    address = client.scheduler.address
+    run = subprocess.Popen(
+        [sys.executable, "-m", "unsmear", *command, "--scheduler", address]
+        + (["--resume"] if resume else []),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for(lambda: len(list(out.glob("*.part/piece_*.json"))) > 3)
+    run.send_signal(signal.SIGINT)
+    _, said = run.communicate(timeout=PATIENCE)
+    assert run.returncode == 130 and "unsmear: interrupted" in said
+    wait_for(lambda: not any(client.processing().values()))
+    left = sorted(path.name for path in out.iterdir())
+    if not resume:
+        assert left == []
+        return
+    assert "a.tif.part" in left and "a.tif" not in left
+    command = ["deblur", str(clips / "a.tif"), "-o", str(out / "a.tif"), *options]
+    assert main([*command, "--resume"]) == 0
+    unsmear.deblur_clip(clips / "a.tif", tmp_path / "alone.tif", **GIVEN)
+    assert (out / "a.tif").read_bytes() == (tmp_path / "alone.tif").read_bytes()
+
+
+def test_the_command_line_starts_a_cluster_of_its_own(tmp_path: Path) -> None:
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif", "b.tif", "c.gif"), 3)
+    (clips / "b.tif").write_bytes(b"no picture")
+    unsmear.write_flow(tmp_path / "flow.flo", GIVEN["flow"])
+    command = ["deblur", "clips/*", "--each", "-o", "out", "--flow", "flow.flo"]
+    command += ["--method", "wiener", "--scheduler", "local", "--json"]
+    done = subprocess.run(
+        [sys.executable, "-m", "unsmear", *command],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    assert "unsmear: clips/b.tif: cannot read" in done.stderr
+    assert "Traceback" not in done.stderr
+    told = json.loads(done.stdout)
+    assert told["clips"] == 3 and told["failed"] == 1
+    assert [one["error"] is None for one in told["results"]] == [True, False, True]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "a.tif",
+        "c.tif",
+    ]
+
+
+def test_a_scheduler_that_does_not_answer(tmp_path: Path, capsys: Any) -> None:
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif",), 2)
+    command = ["deblur", str(clips / "a.tif"), "-o", str(tmp_path / "out.tif")]
+    with dask.config.set({"distributed.comm.timeouts.connect": "0.3s"}):
+        assert main([*command, "--scheduler", "tcp://127.0.0.1:9"]) == 1
+    assert "127.0.0.1:9" in capsys.readouterr().err
+    assert not (tmp_path / "out.tif").exists()
