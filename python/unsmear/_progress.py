@@ -41,7 +41,8 @@ class ProgressBar:
             file=shown,
             disable=not shown.isatty(),
             leave=False,
-            bar_format="{desc} {percentage:3.0f}% |{bar}| {elapsed} < {remaining}{postfix}",
+            bar_format="{desc} {percentage:3.0f}% |{bar}| "
+            "{elapsed} < {remaining}{postfix}",
             # Frames take about equally long: the mean of all tells best.
             smoothing=0.0,
         )

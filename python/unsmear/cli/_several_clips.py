@@ -19,7 +19,7 @@ from unsmear.streaming.several_clips import (
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
     from unsmear.streaming.several_clips import ClipOutcome, Job
 
@@ -33,8 +33,8 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--each",
         action="store_true",
-        help="every FRAMES, and every match of a glob, is a clip of its own: for stacks "
-        "and animations; several videos or folders are that anyway",
+        help="every FRAMES, and every match of a glob, is a clip of its own: for "
+        "stacks and animations; several videos or folders are that anyway",
     )
     verb.add_argument(
         "--scheduler",
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace, jobs: list[Job], given: dict[str, Any]) -> 
 
 def _outcomes(
     scheduler: str | None, jobs: list[Job], progress: Any, given: dict[str, Any]
-) -> Iterator[ClipOutcome]:
+) -> Generator[ClipOutcome, None, None]:
     if scheduler is None:
         return one_after_another(jobs, progress=progress, **given)
     from unsmear.dask.clips import deblur_clips

@@ -1,7 +1,7 @@
 """Stacks and pictures larger than memory, and clips over a cluster.
 
-Needs dask: ``pip install 'unsmear[dask]'``. Functions have the names of those for arrays
-in memory, take `dask.array` and return it, computed when it is asked for.
+Needs dask: ``pip install 'unsmear[dask]'``. Functions have the names of those for
+arrays in memory, take `dask.array` and return it, computed when it is asked for.
 
 | module     | task                                                                |
 |------------|---------------------------------------------------------------------|
@@ -10,6 +10,7 @@ in memory, take `dask.array` and return it, computed when it is asked for.
 | flow       | motion of every frame of a stack, chunk by chunk in time            |
 | stacks     | every frame of a stack restored by itself                           |
 | sequences  | the chain of `unsmear.deblur_sequence`, with the frames it looks at |
+| halos      | how much of its surroundings a tile needs                           |
 | tiles      | one large picture, tile by tile with the exact halo                 |
 | clips      | clips from file to file, each one task of `dask.distributed`        |
 """

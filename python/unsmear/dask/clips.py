@@ -22,7 +22,7 @@ from unsmear.streaming.part_folder import AtWorkError, discard_part
 from unsmear.streaming.several_clips import FAILURES, ClipOutcome, reason
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable, Iterator
 
     from unsmear.streaming.results import ClipResult
     from unsmear.streaming.several_clips import Job, ProgressOfClips
@@ -47,7 +47,7 @@ def deblur_clips(
     resume: bool = False,
     progress: ProgressOfClips | None = None,
     **options: Any,
-) -> Iterator[ClipOutcome]:
+) -> Generator[ClipOutcome, None, None]:
     """Restore clips from file to file over a `dask.distributed` cluster.
 
     Parameters

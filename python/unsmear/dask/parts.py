@@ -8,6 +8,7 @@ the same call has the same keys in any process.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import dask.array as da
@@ -92,7 +93,7 @@ def ranges_of(lengths: Sequence[int], end: int | None = None) -> list[Range]:
     """Return from and up to where each chunk goes, cut at ``end``, empty ones out."""
     edges = [int(n) for n in np.cumsum([0, *lengths])]
     last = edges[-1] if end is None else end
-    pairs = zip(edges[:-1], edges[1:], strict=True)
+    pairs = pairwise(edges)
     return [(start, min(stop, last)) for start, stop in pairs if start < last]
 
 
@@ -108,7 +109,7 @@ def block(array: Any, *ranges: Range) -> Any:
     return part.to_delayed(optimize_graph=False).item()
 
 
-def joined(blocks: list[Any], shapes: list[tuple[int, ...]], dtype: Any) -> Any:
+def joined(blocks: list[Any], shapes: Sequence[tuple[int, ...]], dtype: Any) -> Any:
     """Return delayed blocks, in the order of the first axis, as one array."""
     arrays = [
         da.from_delayed(one, shape, dtype=dtype, name=f"part-{one.key}")

@@ -188,7 +188,7 @@ class Window:
         if self._start <= index < self._start + len(self._frames):
             return np.asarray(self._frames[index - self._start])
         if index == 0:
-            return self._first
+            return np.asarray(self._first)
         last = self._start + len(self._frames) - 1
         raise IndexError(f"frame must be in {self._start}..{last}, got {index}")
 
@@ -204,7 +204,7 @@ def restored(
     start: int,
     wanted: Range,
     shape: tuple[int, ...],
-    given: tuple[Any, ...],
+    given: Any,
     second_pass: bool | None,
 ) -> Restored:
     """Return restored frames, their velocities and reports.

@@ -13,7 +13,7 @@ from unsmear.streaming.deblur_clip import deblur_clip
 from unsmear.video import READ_SUFFIXES, WRITE_SUFFIXES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Generator, Iterable, Sequence
 
     from unsmear.streaming.results import ClipResult
 
@@ -132,7 +132,7 @@ def targets_in(folder: str, clips: Sequence[str]) -> list[str]:
 
 def one_after_another(
     jobs: Iterable[Job], *, progress: ProgressOfClips | None = None, **options: Any
-) -> Iterator[ClipOutcome]:
+) -> Generator[ClipOutcome, None, None]:
     """Restore clips, and go on with the next where one fails.
 
     Parameters
