@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _FAILED = 1
 SHOWN = 3
 """Clips at work whose names fit on the line of progress."""
+NOTES = 2
+"""Verdicts and warnings on the line that tells of a clip."""
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
@@ -147,7 +149,10 @@ def _told(outcome: ClipOutcome) -> dict[str, Any]:
 
 
 def _line(told: dict[str, Any]) -> str:
-    parts = [f"{told['frames']} frames", *told["verdicts"], *told["warnings"]]
+    notes = [*told["verdicts"], *told["warnings"]]
+    parts = [f"{told['frames']} frames", *notes[:NOTES]]
     if told["taken up at frame"]:
         parts.insert(1, f"taken up at {told['taken up at frame']}")
+    if len(notes) > NOTES:
+        parts.append(f"and {len(notes) - NOTES} more notes (--json)")
     return f"{_name(told['source'])} -> {told['written']}  {'; '.join(parts)}"

@@ -9,6 +9,7 @@ after the frame it is at when the client no longer wants it.
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 import uuid
@@ -189,6 +190,9 @@ def _client_of(scheduler: Any, count: int) -> Iterator[Any]:
                 n_workers=workers,
                 threads_per_worker=1,
                 dashboard_address=None,
+                # Of tasks that were cancelled, and of workers that died, the outcome
+                # tells.
+                silence_logs=logging.ERROR,
                 env={VARIABLE: share},
             ) as cluster,
             Client(cluster) as client,
