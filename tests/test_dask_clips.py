@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from unsmear.cli import main
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not here")
 import dask  # noqa: E402
 import unsmear.dask  # noqa: E402
+from unsmear.streaming.part_folder import _locked  # noqa: E402
 
 COUNT = 8
 SHAPE = (40, 56)
@@ -115,6 +117,52 @@ def test_one_bad_clip_spoils_no_other(tmp_path: Path, client: Any) -> None:
     assert outcomes[0].error is None and outcomes[0].result.count == COUNT
     assert outcomes[1].result is None and "the file is empty" in outcomes[1].error
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.tif", "clips"]
+
+
+def test_a_task_waits_for_a_predecessor_that_is_still_ending(
+    tmp_path: Path, client: Any
+) -> None:
+    pytest.importorskip("fcntl")
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif",))
+    part = tmp_path / "a.tif.part"
+    part.mkdir()
+    with _locked(part):
+        outcomes = unsmear.dask.deblur_clips(
+            [(str(clips / "a.tif"), str(tmp_path / "a.tif"))],
+            scheduler=client,
+            progress=lambda _, share: told.append(share),
+            **GIVEN,
+        )
+        told: list[float] = []
+        made: list[Any] = []
+        waiting = threading.Thread(target=lambda: made.extend(outcomes))
+        waiting.start()
+        # Frames are checked without a word in between but the first.
+        wait_for(lambda: len(told) > 2)
+        assert not made and max(told) == 0
+    waiting.join(PATIENCE)
+    assert made[0].error is None and made[0].result.taken_up_at == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.tif", "clips"]
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_an_unfinished_job_is_gone_on_with_only_on_request(
+    tmp_path: Path, client: Any, resume: bool
+) -> None:
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif",))
+    job = (str(clips / "a.tif"), str(tmp_path / "a.tif"))
+
+    def stop(share: float) -> None:
+        if share >= 4 / COUNT:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        unsmear.deblur_clip(*job, resume=True, progress=stop, **GIVEN)
+    (outcome,) = unsmear.dask.deblur_clips(
+        [job], scheduler=client, resume=resume, **GIVEN
+    )
+    assert outcome.error is None
+    assert outcome.result.taken_up_at == (4 if resume else 0)
 
 
 def test_workers_share_the_processors(client: Any) -> None:
