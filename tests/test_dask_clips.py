@@ -64,16 +64,10 @@ def client() -> Iterator[Any]:
         yield connected
 
 
-def test_a_killed_worker_loses_nothing(tmp_path: Path, client: Any) -> None:
-    names = ("a.tif", "b.tif", "c.tif", "d.tif")
-    clips = folder_of_clips(tmp_path / "clips", names)
-    (tmp_path / "alone").mkdir()
-    (tmp_path / "out").mkdir()
-    for name in names:
-        unsmear.deblur_clip(clips / name, tmp_path / "alone" / name, **GIVEN)
+def doom(client: Any, count: int) -> set[int]:
+    """Make workers kill themselves at their third frame, and return their numbers."""
 
-    def die_at_the_third_frame(dask_worker: Any = None) -> int:
-        """Make a worker kill itself in the middle of its first clip."""
+    def die_at_the_third_frame() -> int:
         from unsmear.streaming.part_folder import PartFolder
 
         add = PartFolder.add
@@ -86,8 +80,20 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, client: Any) -> None:
         PartFolder.add = add_and_die  # type: ignore[method-assign]
         return os.getpid()
 
-    first = next(iter(client.scheduler_info()["workers"]))
-    doomed = client.run(die_at_the_third_frame, workers=[first])[first]
+    client.wait_for_workers(2, timeout=PATIENCE)
+    chosen = list(client.scheduler_info()["workers"])[:count]
+    return set(client.run(die_at_the_third_frame, workers=chosen).values())
+
+
+def test_a_killed_worker_loses_nothing(tmp_path: Path, client: Any) -> None:
+    names = ("a.tif", "b.tif", "c.tif", "d.tif")
+    clips = folder_of_clips(tmp_path / "clips", names)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "out").mkdir()
+    for name in names:
+        unsmear.deblur_clip(clips / name, tmp_path / "alone" / name, **GIVEN)
+
+    doomed = doom(client, 1)
     shares: dict[int, float] = {}
     outcomes = list(
         unsmear.dask.deblur_clips(
@@ -102,8 +108,31 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, client: Any) -> None:
     taken_up = [outcome.result.taken_up_at for outcome in outcomes]
     assert sorted(taken_up) == [0, 0, 0, 3], "taken up where the dead one left it"
     assert bytes_of(tmp_path / "out") == bytes_of(tmp_path / "alone")
-    assert doomed not in client.run(os.getpid).values(), "it was killed indeed"
+    assert not doomed & set(client.run(os.getpid).values()), "it was killed indeed"
     assert shares and max(shares.values()) <= 1
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_clip_that_kills_its_workers_is_given_up(
+    tmp_path: Path, client: Any, monkeypatch: pytest.MonkeyPatch, resume: bool
+) -> None:
+    clips = folder_of_clips(tmp_path / "clips", ("a.tif",))
+    monkeypatch.setattr(client.cluster.scheduler, "allowed_failures", 0)
+    doom(client, 2)
+    (outcome,) = unsmear.dask.deblur_clips(
+        [(str(clips / "a.tif"), str(tmp_path / "a.tif"))],
+        scheduler=client,
+        resume=resume,
+        **GIVEN,
+    )
+    assert outcome.result is None
+    assert (
+        outcome.error == "workers died over it, 1 in all; what they logged may tell why"
+    )
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == (["a.tif.part", "clips"] if resume else ["clips"])
+    # The other one would die of the next test's clip.
+    client.restart(timeout=PATIENCE)
 
 
 def test_one_bad_clip_spoils_no_other(tmp_path: Path, client: Any) -> None:

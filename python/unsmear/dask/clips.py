@@ -107,7 +107,8 @@ def deblur_clips(
             for number, made, error in _outcomes(
                 client, jobs, options, progress, resume=resume
             ):
-                unfinished.discard(number)
+                if made is not None:
+                    unfinished.discard(number)
                 yield ClipOutcome(number, *given[number], made, error)
     finally:
         if not resume:
@@ -154,7 +155,7 @@ def _outcomes(
             if future.status == "finished":
                 yield number, *future.result()
             elif future.status == "error":
-                yield number, None, reason(future.exception())
+                yield number, None, _death_or_reason(future.exception())
             else:
                 yield number, None, "the task was lost with its scheduler"
             future.release()
@@ -164,6 +165,16 @@ def _outcomes(
         if progress is not None:
             with suppress(Exception):
                 client.unsubscribe_topic(topic)
+
+
+def _death_or_reason(failure: BaseException) -> str:
+    """Return what is to be told of a task that raised, or killed its workers."""
+    from distributed import KilledWorker
+
+    if not isinstance(failure, KilledWorker):
+        return reason(failure)
+    died = failure.allowed_failures + 1
+    return f"workers died over it, {died} in all; what they logged may tell why"
 
 
 @contextmanager
