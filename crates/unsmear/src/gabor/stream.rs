@@ -14,9 +14,9 @@ use crate::convolve::pad_row;
 use crate::even_odd::{even_odd_sums, even_sums, mirrored_sums};
 use crate::real::Real;
 
-/// Rows that are worth a stream of their own, when several run side by side: of the rows filtered along x, `2 r` more
-/// than these are done.
-pub(crate) const BAND: usize = 32;
+/// Fewest rows that are worth a stream of their own, when several run side by side: of the rows filtered along x, `2 r`
+/// more than these are done.
+pub(crate) const FEWEST_ROWS: usize = 16;
 
 /// The responses of a bank to a picture, asked for row by row.
 pub(crate) struct ResponseRows<'a, T> {

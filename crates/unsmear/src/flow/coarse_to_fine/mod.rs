@@ -15,6 +15,7 @@
 
 use ndarray::{Array2, s};
 
+use crate::awake::awake;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow::Estimate;
@@ -107,12 +108,14 @@ impl CoarseToFine {
         let ways = [*sequence, reversed];
         let ways = &ways[..=usize::from(self.forward_backward)];
         control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
-        let (mut estimate, levels) = self.one_way(sequence, true, control)?;
-        for way in &ways[1..] {
-            let (back, _) = self.one_way(way, false, control)?;
-            check_round_trip(&mut estimate, &back.flow, control)?;
-        }
-        Ok((estimate, levels))
+        awake(|| {
+            let (mut estimate, levels) = self.one_way(sequence, true, control)?;
+            for way in &ways[1..] {
+                let (back, _) = self.one_way(way, false, control)?;
+                check_round_trip(&mut estimate, &back.flow, control)?;
+            }
+            Ok((estimate, levels))
+        })
     }
 
     /// Number of warps, the unit of progress.
