@@ -12,6 +12,7 @@ from unsmear import synthetic
 da = pytest.importorskip("dask.array", reason="dask is not here")
 import dask  # noqa: E402
 import unsmear.dask  # noqa: E402
+from unsmear.dask import halos  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
@@ -62,8 +63,40 @@ def test_a_smaller_halo_would_not_do() -> None:
     for length in (8.0, 20.0):
         flow = np.full((1, 101, 2), (length, 0.0))
         reached = np.flatnonzero(unsmear.blur(image, flow)[0])
-        halo = unsmear.dask.halos.blur_halo(length)
+        halo = halos.blur_halo(length)
         assert halo - 2 <= 50 - reached[0] <= halo
+
+
+def speeding_up(height: int, width: int) -> np.ndarray:
+    """Motion that grows along itself as fast as a walk follows it, and starts anew."""
+    flow = np.zeros((height, width, 2), np.float32)
+    flow[..., 0] = 0.6 + 0.45 * (np.arange(width) % 21)
+    return flow
+
+
+def test_restoring_looks_as_far_as_motion_that_grows_leads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    image, flow = synthetic.texture((24, 400), seed=2), speeding_up(24, 400)
+    whole = unsmear.deblur(image, flow, method="wiener", regularization=0.01).image
+
+    def made() -> np.ndarray:
+        lazy = da.from_array(image, chunks=(24, 19))
+        return unsmear.dask.wiener(lazy, flow, regularization=0.01).compute()
+
+    np.testing.assert_array_equal(made(), whole)
+    monkeypatch.setattr("unsmear.dask.tiles.wiener_halo", lambda *_: 25)
+    assert not np.array_equal(made(), whole), "a smaller halo would not do"
+
+
+@pytest.mark.parametrize("length", [0.7, 3.0, 12.5, 60.0, 250.0])
+def test_halos_hold_what_the_core_says_it_reads(length: float) -> None:
+    flow = np.full((8, 9, 2), (length, 0))
+    options = {"method": "wiener", "noise": 1.0}
+    reach = unsmear.deblur(np.ones((8, 9)), flow, **options).report["reach"]
+    detail, spline = halos.DETAIL, halos.SPLINE
+    halo = halos.wiener_halo(length, 1.0)
+    assert halo - spline - 1 >= reach - detail >= 0
 
 
 def test_blur_longer_than_announced_is_refused_when_it_is_met() -> None:
