@@ -89,9 +89,10 @@ def deblur(
         rings more. "richardson-lucy": likeliest non-negative picture, for comparison.
         "wiener": the best finite inverse of each pixel's blur along its streamline;
         local. "thesis": the founding method exactly. **It makes pictures worse** (1 to
-        12 dB in every case measured) and leaves a black border of 9 or 10 px: its inverse
-        is sampled at the size of its kernel and so wraps round itself, it shifts the
-        picture, dims it by 1/(1 + r), and rounds lengths. Kept for reference.
+        12 dB in every case measured) and leaves a black border of 9 or 10 px: its
+        inverse is sampled at the size of its kernel and so wraps round itself, it
+        shifts the picture, dims it by 1/(1 + r), and rounds lengths. Kept for
+        reference.
     acceleration : array_like of shape (H, W, 2), optional
         Change of the velocity at a fixed pixel, px/frame^2, as for uneven hand shake.
         Default: a steady field. Unused by "wiener" and "thesis".
