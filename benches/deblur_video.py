@@ -188,7 +188,7 @@ def main() -> None:
         made = clip(motion, name, exposure, seed)
         title = f"{motion}, exposure {exposure}, {name}, seed {seed}"
         line = row(title, made.blurred, made.sharp, [2], [2], options.joint)
-        rows.append(line | {"synthetic": True})
+        rows.append(line | {"source": f"{name}, seed {seed}"})
         # What there is so far: a long run may be cut short.
         write(options.output, rows, options.joint)
     if options.data:
@@ -199,8 +199,11 @@ def main() -> None:
 def markdown(report: dict[str, Any]) -> str:
     """Return the table, after what the synthetic clips come to."""
     rows = report["records"]
-    names = [name for name in rows[0] if name != "synthetic"]
-    made = [line for line in rows if line.get("synthetic")]
+    names = [name for name in rows[0] if name != "source"]
+    made: dict[str, list[float]] = {}
+    for line in rows:
+        if "source" in line:
+            made.setdefault(line["source"], []).append(line["gain"])
     lines = [
         "# Blurred clips restored without any parameter",
         "",
@@ -210,10 +213,17 @@ def markdown(report: dict[str, Any]) -> str:
         "",
     ]
     if made:
-        mean, worst = (f([line["gain"] for line in made]) for f in (np.mean, np.min))
-        lines[2] += f" Synthetic clips: mean {mean:+.2f} dB, worst {worst:+.2f} dB."
+        every = [gain for gains in made.values() for gain in gains]
+        lines += [
+            "| synthetic clips | number | mean gain | worst |",
+            "|---|---|---|---|",
+        ]
+        for source, gains in (made | {"all": every}).items():
+            mean, worst = np.mean(gains), min(gains)
+            lines.append(f"| {source} | {len(gains)} | {mean:+.2f} | {worst:+.2f} |")
+        lines.append("")
     lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
-    for line in sorted(rows, key=lambda line: not line.get("synthetic")):
+    for line in sorted(rows, key=lambda line: "source" not in line):
         lines.append("| " + " | ".join(str(line[name]) for name in names) + " |")
     return "\n".join([*lines, ""])
 

@@ -23,10 +23,11 @@ BENCHES = ("deblur_table", "deblur_mismatch", "deblur_video")
 
 
 def united(values: list[Any]) -> Any:
-    """Return one value for all: lists united, of single values the last."""
+    """Return one value for all: lists united, single values that differ all named."""
     if isinstance(values[0], list):
         return list(dict.fromkeys(item for some in values for item in some))
-    return values[-1]
+    different = list(dict.fromkeys(values))
+    return different[0] if len(different) == 1 else " and ".join(map(str, different))
 
 
 def joined(reports: list[dict[str, Any]]) -> dict[str, Any]:
