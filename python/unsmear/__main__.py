@@ -2,4 +2,6 @@
 
 from unsmear.cli import entry
 
-entry()
+# A process that another one spawns imports this module under another name.
+if __name__ == "__main__":
+    entry()

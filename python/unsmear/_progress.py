@@ -41,20 +41,27 @@ class ProgressBar:
             file=shown,
             disable=not shown.isatty(),
             leave=False,
-            bar_format="{desc} {percentage:3.0f}% |{bar}| {elapsed} < {remaining}",
+            bar_format="{desc} {percentage:3.0f}% |{bar}| "
+            "{elapsed} < {remaining}{postfix}",
             # Frames take about equally long: the mean of all tells best.
             smoothing=0.0,
         )
         self._begun = False
 
-    def __call__(self, share: float) -> None:
-        """Show that ``share`` of the work is done."""
+    def __call__(self, share: float, *, note: str = "") -> None:
+        """Show that ``share`` of the work is done, and what is at work."""
+        self._bar.set_postfix_str(note, refresh=False)
         if not self._begun and share > 0:
             # What an earlier run has done took no time in this one.
             self._begun = True
             self._bar.reset(total=1.0)
             self._bar.initial = self._bar.n = self._bar.last_print_n = share
         self._bar.update(min(share, 1.0) - self._bar.n)
+
+    def say(self, text: str, stream: TextIO) -> None:
+        """Print a line that stays, above the bar."""
+        with self._bar.external_write_mode(file=stream):
+            print(text, file=stream, flush=True)
 
     def __enter__(self) -> ProgressBar:
         return self

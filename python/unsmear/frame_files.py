@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 from unsmear.images import PICTURE_SUFFIXES, as_path
 from unsmear.video import READ_SUFFIXES
 
-__all__ = ["is_video", "located", "natural_key"]
+__all__ = ["is_video", "located", "matches", "natural_key"]
 
 Source = str | os.PathLike[str]
 
@@ -46,6 +46,15 @@ def located(source: Source | Iterable[Source]) -> Path | list[Path]:
     if not paths:
         raise ValueError("source must name at least one picture, got an empty list")
     return paths
+
+
+def matches(name: Source) -> list[Path]:
+    """Return what a pattern matches, in natural order; the path itself if it is none.
+
+    A name with wildcards under which there is something is that, and no pattern.
+    """
+    path = as_path(name, "source")
+    return [path] if path.exists() or not _is_glob(path) else _matches(path)
 
 
 def is_video(path: Path) -> bool:
@@ -103,17 +112,21 @@ def _pictures_of_folder(folder: Path) -> list[Path]:
     return pictures
 
 
-def _pictures_of_glob(pattern: Path) -> list[Path]:
+def _matches(pattern: Path) -> list[Path]:
     root = Path(pattern.anchor)
     relative = str(pattern.relative_to(root)) if pattern.anchor else str(pattern)
-    matches = sorted(root.glob(relative), key=_path_key)
-    videos = [p for p in matches if p.suffix.lower() in READ_SUFFIXES and p.is_file()]
-    pictures = [path for path in matches if _is_visible_picture(path)]
+    return sorted(root.glob(relative), key=_path_key)
+
+
+def _pictures_of_glob(pattern: Path) -> list[Path]:
+    found = _matches(pattern)
+    videos = [p for p in found if p.suffix.lower() in READ_SUFFIXES and p.is_file()]
+    pictures = [path for path in found if _is_visible_picture(path)]
     if not pictures and len(videos) == 1:
         return videos
     if not pictures:
         raise ValueError(
-            f"source must match pictures, got {len(matches)} matches and no picture "
+            f"source must match pictures, got {len(found)} matches and no picture "
             f"for the pattern {str(pattern)!r}"
         )
     return pictures

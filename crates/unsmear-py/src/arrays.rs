@@ -3,7 +3,11 @@
 use ndarray::{Array2, Array3, Axis};
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray3};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 use unsmear::{Error, FlowField, FlowView, Real, Result};
+
+/// Vectors that outweigh a task.
+const LEAST_PAIRS: usize = 1 << 15;
 
 /// (H, W, 2) as a view of its two components.
 pub(crate) fn flow_view<'a, T: Real + Element>(
@@ -26,10 +30,21 @@ pub(crate) fn flow_to_python<T: Real + Element>(
     py: Python<'_>,
     flow: FlowField<T>,
 ) -> Bound<'_, PyArray3<T>> {
+    interleaved(&flow).into_pyarray(py)
+}
+
+/// (H, W, 2), by the threads of the pool it is called in.
+pub(crate) fn interleaved<T: Real>(flow: &FlowField<T>) -> Array3<T> {
     let (height, width) = flow.dim();
-    let pairs: Vec<[T; 2]> = flow.u.iter().zip(&flow.v).map(|(&u, &v)| [u, v]).collect();
-    let both = Array3::from_shape_vec((height, width, 2), pairs.into_flattened());
-    both.unwrap_or_else(|_| Array3::zeros((height, width, 2))).into_pyarray(py)
+    let mut both = Vec::with_capacity(height * width);
+    if let (Some(u), Some(v)) = (flow.u.as_slice(), flow.v.as_slice()) {
+        let pairs = u.par_iter().zip(v).map(|(&u, &v)| [u, v]);
+        pairs.with_min_len(LEAST_PAIRS).collect_into_vec(&mut both);
+    } else {
+        both.extend(flow.u.iter().zip(&flow.v).map(|(&u, &v)| [u, v]));
+    }
+    Array3::from_shape_vec((height, width, 2), both.into_flattened())
+        .unwrap_or_else(|_| Array3::zeros((height, width, 2)))
 }
 
 /// A picture (H, W).

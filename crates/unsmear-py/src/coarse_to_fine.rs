@@ -1,10 +1,10 @@
 //! The default flow.
 
-use numpy::{Element, PyReadonlyArray2, PyReadonlyArray4};
+use numpy::{Element, IntoPyArray, PyReadonlyArray2, PyReadonlyArray4};
 use pyo3::prelude::*;
 use unsmear::flow::coarse_to_fine::{CoarseToFine, Sample, Sequence};
 
-use crate::arrays::{flow_to_python, picture_to_python};
+use crate::arrays::{interleaved, picture_to_python};
 use crate::threads::run;
 
 #[derive(FromPyObject)]
@@ -109,12 +109,15 @@ fn estimate<T: Sample + Element>(
 ) -> PyResult<Found> {
     let sequence =
         Sequence { frames: frames.as_array(), index, mask: mask.map(PyReadonlyArray2::as_array) };
-    let (estimate, levels) = run(py, progress, |control| method.trace(&sequence, control))?;
-    let flow = flow_to_python(py, estimate.flow).into_any().unbind();
+    let (flow, confidence, levels) = run(py, progress, |control| {
+        let (estimate, levels) = method.trace(&sequence, control)?;
+        Ok((interleaved(&estimate.flow), estimate.confidence, levels))
+    })?;
+    let flow = flow.into_pyarray(py).into_any().unbind();
     let levels = levels.into_iter().map(|level| {
         let (height, width) = level.size;
         (level.frames, height, width, level.changes, level.evidence, level.rest)
     });
-    let confidence = picture_to_python(py, estimate.confidence).into_any().unbind();
+    let confidence = picture_to_python(py, confidence).into_any().unbind();
     Ok((flow, confidence, levels.collect()))
 }

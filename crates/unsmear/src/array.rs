@@ -4,14 +4,13 @@
 //! instructions in the same order whoever computes it, and nothing is summed across threads.
 
 use ndarray::{ArrayView2, ArrayView3};
-use rayon::prelude::*;
 
 use crate::control::Control;
 use crate::error::{Error, Result};
+use crate::tasks::{cut, for_each_task, runs};
 
-/// Rows per task: large enough that a task outweighs its scheduling (about 1 us) on the narrowest useful picture,
-/// small enough that two threads finish together on the shortest.
-const ROWS_PER_TASK: usize = 8;
+/// Fewest rows per task: it outweighs its scheduling (about 1 us) on the narrowest useful picture.
+pub(crate) const FEWEST_ROWS: usize = 8;
 
 /// Samples below which one thread is done before another has heard of the work.
 pub(crate) const FEW: usize = 4096;
@@ -51,8 +50,8 @@ pub(crate) fn for_each_row_with<T: Send, S>(
     if out.len() <= FEW {
         return several(0, out);
     }
-    let tasks = out.par_chunks_mut(width * ROWS_PER_TASK).enumerate();
-    tasks.try_for_each(|(task, rows)| several(task * ROWS_PER_TASK, rows))
+    let runs = runs(out.len().div_ceil(width), FEWEST_ROWS..=usize::MAX);
+    for_each_task(cut(out, width, &runs), runs.len(), |(first, rows)| several(first, rows))
 }
 
 /// Checks that a sequence (T, H, W) has at least the given extents.

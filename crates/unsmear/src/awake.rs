@@ -3,23 +3,15 @@
 //! A thread of the pool without work falls asleep within some ten microseconds, and waking it takes
 //! tens of microseconds more: as long as a stage on a small picture. While [`awake`] runs its work,
 //! the other threads of the pool look for parts of it without sleeping, but for no longer than
-//! [`PATIENCE`] in vain: a long stage on one thread keeps no other busy with waiting.
+//! [`PATIENCE`](crate::tasks::PATIENCE) in vain: a long stage on one thread keeps no other busy with waiting.
 //!
 //! Nothing of a result depends on it.
 
 use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::{Duration, Instant};
 
-use rayon::Yield;
-
-/// How long a thread looks for work before it may sleep: longer than the stages that one thread does alone.
-const PATIENCE: Duration = Duration::from_micros(500);
-/// After this it lets other processes of the machine go first.
-const HASTE: Duration = Duration::from_micros(50);
-/// Pauses between two looks.
-const PAUSES: usize = 32;
+use crate::tasks::wait_while;
 
 thread_local! {
     /// Whether this thread has work of its own under way, which others may not hold up.
@@ -48,31 +40,12 @@ pub(crate) fn awake<R>(work: impl FnOnce() -> R) -> R {
     let watch = Watch { on: Arc::clone(&on), before: AT_WORK.replace(true) };
     rayon::spawn_broadcast(move |_| {
         if !AT_WORK.get() {
-            attend(&on);
+            wait_while(|| on.load(Relaxed));
         }
     });
     let result = work();
     drop(watch);
     result
-}
-
-/// Does what there is to do until `on` ends or nothing comes.
-fn attend(on: &AtomicBool) {
-    let mut idle_since = Instant::now();
-    while on.load(Relaxed) {
-        if rayon::yield_now() == Some(Yield::Executed) {
-            idle_since = Instant::now();
-            continue;
-        }
-        let idle = idle_since.elapsed();
-        if idle > PATIENCE {
-            break;
-        }
-        if idle > HASTE {
-            std::thread::yield_now();
-        }
-        (0..PAUSES).for_each(|_| std::hint::spin_loop());
-    }
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ use crate::convolve::{gaussian_taps, pad_row, weighted_sum};
 use crate::error::Result;
 use crate::real::Real;
 use crate::smoothing::support;
+use crate::tasks::filled_picture;
 
 /// `picture` of even sides at half its size.
 ///
@@ -36,7 +37,7 @@ pub(crate) fn smooth_and_halve<T: Real>(
         (0..2 * radius + 2).map(|k| T::of(0.5 * (at(k) + at(k.wrapping_sub(1))))).collect();
     let (height, width) = picture.dim();
     let half = width / 2;
-    let mut out = Array2::zeros((height / 2, half));
+    let mut out = filled_picture(T::zero(), (height / 2, half));
     let picture = picture.as_standard_layout();
     let source = picture.as_slice().unwrap_or_default();
     let target = out.as_slice_mut().unwrap_or_default();

@@ -29,6 +29,7 @@ use crate::flow_field::FlowView;
 use crate::real::Real;
 use crate::spline_filter::{cubic_poles, quintic_poles, spline_coefficients};
 use crate::spline_values::{evaluate, moved};
+use crate::tasks::filled_picture;
 
 /// Degree of the spline between the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -126,7 +127,7 @@ impl<T: Real> SplineImage<T> {
         control: &Control,
     ) -> Result<Array2<T>> {
         require_same("x", x, y.dim())?;
-        let mut out = Array2::zeros(y.dim());
+        let mut out = filled_picture(T::zero(), y.dim());
         let width = x.ncols();
         let scratch = || (vec![0.0; width], vec![0.0; width]);
         let values = out.as_slice_mut().unwrap_or_default();
@@ -146,7 +147,7 @@ impl<T: Real> SplineImage<T> {
     /// [`Error::Shape`] when the flow's shape is not the picture's; [`Error::Cancelled`].
     pub fn warp(&self, flow: FlowView<'_, T>, control: &Control) -> Result<Array2<T>> {
         require_same("flow", &flow.u, self.dim())?;
-        let mut out = Array2::zeros(self.dim());
+        let mut out = filled_picture(T::zero(), self.dim());
         let width = self.width;
         let (u, v) = (flow.u.as_standard_layout(), flow.v.as_standard_layout());
         let [u, v] = [&u, &v].map(|c| c.as_slice().unwrap_or_default());

@@ -5,7 +5,7 @@
 //! | rank | modules | concept |
 //! |---|---|---|
 //! | 0 | [`error`], [`real`] | failures; `f32` and `f64` |
-//! | 1 | [`border`], [`control`], [`flow_field`] | picture edges; cancellation; a field of motion |
+//! | 1 | [`border`], [`control`], [`flow_field`], `tasks` | picture edges; cancellation; a field of motion; work shared among threads |
 //! | 2 | `array`, `awake`, [`fourier`] | shape checks, rows in parallel; threads that do not sleep; planned transforms |
 //! | 3 | [`convolve`], `even_odd`, [`fft_convolve`] | separable correlation; pairs of filters; convolution with large kernels |
 //! | 4 | `gabor::parameters`, `gabor::responses`, `gabor::taps`, [`phase_rate`] | parts of the bank; rates of phase |
@@ -111,6 +111,7 @@ pub mod spatiotemporal;
 mod spline_filter;
 mod spline_values;
 mod streamline;
+mod tasks;
 pub mod weighted_median;
 
 pub use border::Border;

@@ -23,6 +23,7 @@ use crate::array::for_each_row_with;
 use crate::control::Control;
 use crate::error::Result;
 use crate::real::Real;
+use crate::tasks::filled;
 
 /// Samples on each side that a coefficient depends on.
 pub(crate) const PREFILTER_REACH: usize = 11;
@@ -45,7 +46,7 @@ impl<T: Real> LocalSpline<T> {
         let (height, width) = image.dim();
         let taps = prefilter_taps::<T>();
         let (rows, stride) = (height + 2 * PAD, width + 2 * PAD);
-        let mut coefficients = vec![T::zero(); rows * stride];
+        let mut coefficients = filled(T::zero(), rows * stride);
         let padded_row = || vec![T::zero(); stride + 2 * PREFILTER_REACH];
         for_each_row_with(&mut coefficients, stride, control, padded_row, |row, out, line| {
             line.fill(T::zero());

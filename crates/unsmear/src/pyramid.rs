@@ -26,6 +26,7 @@ use crate::error::Result;
 use crate::halving::smooth_and_halve;
 use crate::real::Real;
 pub use crate::smoothing::smooth;
+use crate::tasks::filled_picture;
 
 /// Deviation before halving, px: a little alias against a little blur.
 const HALVING_SIGMA: f64 = 0.9;
@@ -55,7 +56,7 @@ pub fn resample<T: Real>(
     if (rows, columns) == (height, width) {
         return Ok(picture.to_owned());
     }
-    let mut out = Array2::zeros((height, width));
+    let mut out = filled_picture(T::zero(), (height, width));
     if picture.is_empty() {
         return Ok(out);
     }

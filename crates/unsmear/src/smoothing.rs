@@ -8,20 +8,22 @@
 //! cache. Units: those of the samples; `s` in px. A NaN spreads over the reach of the filter. The form for filters of
 //! any shape and for volumes is [`crate::convolve`].
 
+use std::ops::RangeInclusive;
+
 use ndarray::{Array2, ArrayView2};
-use rayon::prelude::*;
 
 use crate::border::Border;
 use crate::control::Control;
 use crate::convolve::{gaussian_taps, pad_row, weighted_sum};
 use crate::error::Result;
 use crate::real::Real;
+use crate::tasks::{cut, filled_picture, for_each_task, runs};
 
 /// Where the taps of [`smooth`] end, in deviations: what is cut off weighs less than 1e-4.
 const SUPPORT: f64 = 4.0;
 /// Rows that [`smooth`] does along both axes at once, so that what lies between stays in cache: with the widest filter
 /// in use a quarter of the rows is done twice.
-const BAND: usize = 64;
+const BAND: RangeInclusive<usize> = 24..=64;
 
 /// Taps of [`smooth`] to each side of the middle.
 pub(crate) fn support(sigma: f64) -> usize {
@@ -40,15 +42,16 @@ pub fn smooth<T: Real>(
     let radius = support(sigma);
     let taps: Vec<T> = gaussian_taps(sigma, radius).into_iter().map(T::of).collect();
     let (height, width) = picture.dim();
-    let mut out = Array2::zeros((height, width));
+    let mut out = filled_picture(T::zero(), (height, width));
     if picture.is_empty() {
         return Ok(out);
     }
     let picture = picture.as_standard_layout();
     let source = picture.as_slice().unwrap_or_default();
     let target = out.as_slice_mut().unwrap_or_default();
-    target.par_chunks_mut(BAND * width).enumerate().try_for_each(|(band, rows)| {
-        let (first, end) = (band * BAND, band * BAND + rows.len() / width);
+    let runs = runs(height, BAND);
+    for_each_task(cut(target, width, &runs), runs.len(), |(first, rows)| {
+        let end = first + rows.len() / width;
         let (top, bottom) = (first.saturating_sub(radius), (end + radius).min(height));
         let mut across = vec![T::zero(); (bottom - top) * width];
         let mut padded = vec![T::zero(); width + 2 * radius];

@@ -28,6 +28,7 @@ use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
 use crate::real::Real;
+use crate::tasks::filled;
 
 /// Lines filtered side by side: one 64-byte cache line of `f32`, and a multiple of every vector register.
 const LANES: usize = 16;
@@ -70,7 +71,7 @@ fn filter_down<T: Real>(
     poles: &[f64],
     control: &Control,
 ) -> Result<Vec<T>> {
-    let mut out = vec![T::zero(); samples.len()];
+    let mut out = filled(T::zero(), samples.len());
     // One "row" of the parallel loop is a block of LANES columns: LANES whole rows of the transpose.
     for_each_row(&mut out, LANES * height, control, |block, columns| {
         let (x0, lanes) = (block * LANES, columns.len() / height);

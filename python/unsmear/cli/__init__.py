@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given)
     options.command = shlex.join(["unsmear", *given])
     try:
-        options.run(options)
+        status: int | None = options.run(options)
     except KeyboardInterrupt:
         print("unsmear: interrupted", file=sys.stderr)
         return _INTERRUPTED
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, TypeError, OSError, ImportError, MemoryError) as error:
         print(f"unsmear: {error or type(error).__name__}", file=sys.stderr)
         return _FAILED
-    return 0
+    return status or 0
 
 
 def entry() -> NoReturn:

@@ -11,7 +11,7 @@ from unsmear import plot
 from unsmear._atomic import write_bytes_atomic
 from unsmear._plain_data import plain_data
 from unsmear._progress import ProgressBar
-from unsmear.cli import _common
+from unsmear.cli import _common, _several_clips
 from unsmear.deblur import METHODS
 from unsmear.flow_files import read_flow
 from unsmear.sequence import JOINT
@@ -41,7 +41,7 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="OUT",
-        help="folder, .tif, .gif or video",
+        help="folder, .tif, .gif or video; for several clips a folder",
     )
     verb.add_argument(
         "--exposure",
@@ -88,27 +88,34 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
         help="leave the sound of a video out",
     )
     _common.add_flow_method(verb, "--flow-method", "balanced")
+    _several_clips.add_arguments(verb)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> int | None:
     """Measure, restore and write."""
     page = bool(options.report) and not options.report.endswith(".json")
+    given: dict[str, Any] = {
+        "method": options.method,
+        "exposure": options.exposure,
+        "flow": read_flow(options.flow) if options.flow else None,
+        "flow_method": options.flow_method,
+        "joint": options.joint,
+        "noise": options.noise,
+        "fps": options.fps,
+        "audio": options.audio,
+        "resume": options.resume,
+        **_common.parameters_of(options),
+    }
+    jobs = _several_clips.jobs_of(options)
+    if jobs is not None:
+        return _several_clips.run(options, jobs, given)
     with ProgressBar("deblur") as bar:
         made = deblur_clip(
             _common.source_of(options),
             options.output,
-            method=options.method,
-            exposure=options.exposure,
-            flow=read_flow(options.flow) if options.flow else None,
-            flow_method=options.flow_method,
-            joint=options.joint,
-            noise=options.noise,
-            fps=options.fps,
-            audio=options.audio,
-            resume=options.resume,
             samples=page,
             progress=bar,
-            **_common.parameters_of(options),
+            **given,
         )
     if options.report:
         _write_report(options, made)
@@ -126,6 +133,7 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         result["reports"] = made.reports
     _common.show_result(result, as_json=options.json)
+    return None
 
 
 def _exposure(text: str) -> float | str:

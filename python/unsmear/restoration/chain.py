@@ -43,12 +43,16 @@ if TYPE_CHECKING:
     Plane = NDArray[np.float32]
     Planes = NDArray[np.float32]
 
-__all__ = ["Chain"]
+__all__ = ["REACH", "Chain"]
 
 SHARPER = 1.0
 """Score of the sharper prior, relative to the other's, below which it is used."""
 KEPT_BEHIND = 5
 """Frames that one looks back on, through exposures and twins of its neighbours."""
+REACH = 7
+"""Frames on each side that one restored in a pass depends on: those of the motions
+behind its neighbours' exposures (five), for its twins and for its neighbours' strength
+one more each."""
 
 
 class Chain:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear.restoration.alternatives import better
-from unsmear.restoration.chain import KEPT_BEHIND, Chain
+from unsmear.restoration.chain import KEPT_BEHIND, REACH, Chain
 from unsmear.restoration.looks import cropped
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from unsmear.restoration.records import Restored, Settings
     from unsmear.restoration.source import Source
 
-__all__ = ["Passes"]
+__all__ = ["Passes", "reach"]
 
 MOST_PASSES = 3
 UNSTEADY = 0.25
@@ -33,6 +33,15 @@ UNSTEADY = 0.25
 PROMISING = 1.1
 """Ratio of the verdict below which flow is measured on the restored frame, whether that
 is good enough to be shown or not."""
+
+
+def reach(again: bool | None, joint: int) -> int:
+    """Return how many frames on each side a restored one may depend on, at most.
+
+    ``again`` is that of `Passes.best`; ``joint`` frames are restored together.
+    """
+    passes = 1 if again is False else MOST_PASSES
+    return passes * REACH + joint // 2
 
 
 class Passes:

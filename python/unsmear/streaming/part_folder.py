@@ -32,11 +32,15 @@ if TYPE_CHECKING:
 
     from unsmear.streaming.writer import Writer
 
-__all__ = ["PartFolder"]
+__all__ = ["AtWorkError", "PartFolder", "discard_part"]
 
 JOB, LOCK = "job.json", "lock"
 DIGEST_BYTES = 16
 CHUNK = 1 << 20
+
+
+class AtWorkError(OSError):
+    """Another process is at work on the target."""
 
 
 class PartFolder:
@@ -69,7 +73,7 @@ class PartFolder:
         self._writer = writer
         self._keep = resume
         self._job = job
-        self.path = target.with_name(f"{target.name}.part")
+        self.path = _part_of(target)
         self._lock: Any = None
         self.pieces: list[Path] = []
         self.done = 0
@@ -228,22 +232,40 @@ class PartFolder:
         return picture, unpacked()[0]["report"]
 
     def _take_lock(self) -> None:
-        lock = (self.path / LOCK).open("w")
-        # A system without such locks leaves it to the user to run one at a time.
-        with suppress(ImportError):
-            fcntl = importlib.import_module("fcntl")
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                lock.close()
-                msg = f"another process is at work in {str(self.path)!r}"
-                raise OSError(msg) from None
-        self._lock = lock
+        self._lock = _locked(self.path)
 
     def _end(self, *, remove: bool) -> None:
         self._lock.close()
         if remove:
             shutil.rmtree(self.path, ignore_errors=True)
+
+
+def discard_part(target: Path) -> None:
+    """Remove what is finished of a job nobody is at work on; other folders stay."""
+    part = _part_of(target)
+    with suppress(OSError):
+        if (part / JOB).is_file():
+            with _locked(part):
+                shutil.rmtree(part, ignore_errors=True)
+
+
+def _part_of(target: Path) -> Path:
+    return target.with_name(f"{target.name}.part")
+
+
+def _locked(part: Path) -> Any:
+    """Return the open file that locks a folder until it is closed."""
+    lock = (part / LOCK).open("w")
+    # A system without such locks leaves it to the user to run one at a time.
+    with suppress(ImportError):
+        fcntl = importlib.import_module("fcntl")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            msg = f"another process is at work in {str(part)!r}"
+            raise AtWorkError(msg) from None
+    return lock
 
 
 def _record(index: int) -> str:

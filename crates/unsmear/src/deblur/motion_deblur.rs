@@ -21,6 +21,7 @@ use super::richardson_lucy::RichardsonLucy;
 use super::tikhonov::Tikhonov;
 use super::total_variation::{Effort, Restored, TotalVariation};
 use crate::array::require_same;
+use crate::awake::awake;
 use crate::control::Control;
 use crate::error::{Error, Result, require};
 use crate::flow_field::FlowView;
@@ -148,7 +149,7 @@ impl MotionDeblur {
         let ceiling = self.ceiling.map(|value| levels.grey(value) as f32);
         let look = Look { paths, planes, weights: weights.used, ceiling };
         let seen = if weights.unknown { Some(seen(&look)?) } else { None };
-        let restored = self.solve(look, noise, levels.scale(), control)?;
+        let restored = awake(|| self.solve(look, noise, levels.scale(), control))?;
         result.images = inputs();
         let lengths = blur_lengths(&blurred.flow, self.exposure);
         compose(&mut result.images, &restored, &lengths, &levels, seen.as_ref());

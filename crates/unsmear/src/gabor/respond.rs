@@ -1,15 +1,15 @@
 //! Responses of a planned bank to a whole picture, in bands of rows side by side.
 
 use ndarray::ArrayView2;
-use rayon::prelude::*;
 
 use super::GaborBank;
 use super::responses::Responses;
-use super::stream::{BAND, ResponseRows};
+use super::stream::{FEWEST_ROWS, ResponseRows};
 use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 use crate::real::Real;
+use crate::tasks::{cut, for_each_task, runs};
 
 impl<T: Real> GaborBank<T> {
     /// Responses of all filters to a picture (H, W).
@@ -31,9 +31,9 @@ impl<T: Real> GaborBank<T> {
         let picture = picture.as_standard_layout();
         let packed = picture.as_slice().unwrap_or_default();
         let row = 2 * filters * width;
-        let bands = responses.packed_mut().par_chunks_mut(BAND * row).enumerate();
-        bands.try_for_each(|(band, out)| {
-            let first = band * BAND;
+        let runs = runs(height, FEWEST_ROWS..=usize::MAX);
+        let bands = cut(responses.packed_mut(), row, &runs);
+        for_each_task(bands, runs.len(), |(first, out)| {
             let mut rows = ResponseRows::new(self, packed, width, border, first);
             for (i, out) in out.chunks_exact_mut(row).enumerate() {
                 control.check()?;

@@ -14,9 +14,9 @@ use crate::convolve::pad_row;
 use crate::even_odd::{even_odd_sums, even_sums, mirrored_sums};
 use crate::real::Real;
 
-/// Rows that are worth a stream of their own, when several run side by side: of the rows filtered along x, `2 r` more
-/// than these are done.
-pub(crate) const BAND: usize = 32;
+/// Fewest rows that are worth a stream of their own, when several run side by side: of the rows filtered along x, `2 r`
+/// more than these are done.
+pub(crate) const FEWEST_ROWS: usize = 16;
 
 /// The responses of a bank to a picture, asked for row by row.
 pub(crate) struct ResponseRows<'a, T> {
@@ -62,10 +62,24 @@ impl<'a, T: Real> ResponseRows<'a, T> {
         while self.next <= (y + self.bank.radius).min(self.height - 1) {
             self.filter_along_x();
         }
-        let bank = self.bank;
-        for pair in &bank.pairs {
-            self.filter_along_y(pair, y, out);
+        let lines = self.lines(y);
+        for pair in &self.bank.pairs {
+            self.filter_along_y(pair, &lines, out);
         }
+    }
+
+    /// The even and the odd lines of each set of taps that the filters along y combine at row `y`, top to bottom.
+    fn lines(&self, y: usize) -> Vec<&[T]> {
+        let (radius, width) = (self.bank.radius, self.width);
+        let kept = 2 * radius + 1;
+        let row = |j: usize| self.border.index((y + j) as isize - radius as isize, self.height);
+        let starts: Vec<_> =
+            (0..kept).map(|j| row(j).map(|row| row % kept * self.stride())).collect();
+        let line = |start: Option<usize>, part: usize| {
+            start.map_or(&self.zeros[..], |start| &self.filtered[start + part * width..][..width])
+        };
+        let parts = 0..2 * self.bank.along_x.len();
+        parts.flat_map(|part| starts.iter().map(move |&start| line(start, part))).collect()
     }
 
     /// Samples of the lines of one row filtered along x.
@@ -93,25 +107,18 @@ impl<'a, T: Real> ResponseRows<'a, T> {
     }
 
     /// One row of the responses of a pair of mirrored filters, or of one on an axis, where `B` or `S` is 0.
-    fn filter_along_y(&self, pair: &MirrorPair<T>, y: usize, out: &mut [T]) {
-        let (width, stride, radius) = (self.width, self.stride(), self.bank.radius);
-        let line = |j: usize, part: usize| {
-            let row = self.border.index((y + j) as isize - radius as isize, self.height);
-            row.map_or(&self.zeros[..], |row| {
-                let start = row % (2 * radius + 1) * stride + (2 * pair.along_x + part) * width;
-                &self.filtered[start..start + width]
-            })
-        };
-        let lines = |part| (0..=2 * radius).map(|j| line(j, part)).collect::<Vec<&[T]>>();
+    fn filter_along_y(&self, pair: &MirrorPair<T>, lines: &[&[T]], out: &mut [T]) {
+        let (width, kept) = (self.width, 2 * self.bank.radius + 1);
+        let lines = |part: usize| &lines[(2 * pair.along_x + part) * kept..][..kept];
         let taps = &pair.along_y;
         let plane = |filter: usize| 2 * filter * width..(2 * filter + 2) * width;
         let Some(mirror) = pair.mirror else {
             let (re, im) = out[plane(pair.filter)].split_at_mut(width);
             if taps.real {
-                even_sums(&lines(0), &taps.even, re);
-                even_sums(&lines(1), &taps.even, im);
+                even_sums(lines(0), &taps.even, re);
+                even_sums(lines(1), &taps.even, im);
             } else {
-                even_odd_sums(&lines(0), &taps.even, &taps.odd, re, im);
+                even_odd_sums(lines(0), &taps.even, &taps.odd, re, im);
             }
             return;
         };
@@ -119,7 +126,7 @@ impl<'a, T: Real> ResponseRows<'a, T> {
         let (before, after) = out.split_at_mut(plane(mirror).start);
         let (re, im) = before[plane(pair.filter)].split_at_mut(width);
         let (mirror_re, mirror_im) = after[..2 * width].split_at_mut(width);
-        let rows = [&lines(0)[..], &lines(1)[..]];
+        let rows = [lines(0), lines(1)];
         mirrored_sums(rows, &taps.even, &taps.odd, re, im, mirror_re, mirror_im);
     }
 }

@@ -44,14 +44,15 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
+use crate::tasks::{cut, for_each_task, runs};
 use lanes::LANES;
 use plan::RowPlan;
 use sweep::{Scratch, Window, gather_row, normal_row, scatter_row};
 
 pub use lanes::Taps;
 
-/// Rows gathered per task.
-const ROWS_PER_TASK: usize = 8;
+/// Fewest rows gathered per task.
+const FEWEST_ROWS: usize = 8;
 /// Rows of data scattered per task, at least: half a millisecond of work on a wide picture, and several tasks per thread
 /// on a low one.
 const LEAST_BAND: usize = 32;
@@ -103,10 +104,10 @@ impl MotionOperator {
     /// A x for a padding that clamps nothing.
     fn gather(&self, x: &[f32], pad: usize, b: &mut [f32]) {
         let stride = self.width + 2 * pad;
-        b.par_chunks_mut(self.width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
+        let runs = runs(self.plans.len(), FEWEST_ROWS..=usize::MAX);
+        each(cut(b, self.width, &runs), runs.len(), |(first, rows)| {
             let mut scratch = Scratch::new();
-            for (i, out) in rows.chunks_mut(self.width).enumerate() {
-                let y = task * ROWS_PER_TASK + i;
+            for (y, out) in (first..).zip(rows.chunks_mut(self.width)) {
                 let x = Window { samples: x, stride, start: (y + pad) * stride + pad };
                 gather_row(&self.plans[y], self.taps, &x, out, &mut scratch);
             }
@@ -116,7 +117,7 @@ impl MotionOperator {
     /// A^T r for a padding that clamps nothing.
     fn scatter(&self, r: &[f32], pad: usize, x: &mut [f32]) {
         let stride = self.width + 2 * pad;
-        let rows = r.par_chunks(self.width * self.band());
+        let rows = r.chunks(self.width * self.band());
         self.for_each_band(x, pad, rows, |y, place, rows| {
             let mut scratch = Scratch::new();
             let mut x = Window { samples: place, stride, start: self.reach * stride + pad };
@@ -138,13 +139,12 @@ impl MotionOperator {
         &self,
         x: &mut [f32],
         pad: usize,
-        data: impl IndexedParallelIterator<Item = D>,
+        data: impl Iterator<Item = D>,
         task: impl Fn(usize, &mut [f32], D) + Sync,
     ) {
         let (stride, band) = (self.width + 2 * pad, self.band());
         let (mut even, mut odd) = (Vec::new(), Vec::new());
-        let data: Vec<D> = data.collect();
-        for (i, data) in data.into_iter().enumerate() {
+        for (i, data) in data.enumerate() {
             if i % 2 == 0 { even.push(Some(data)) } else { odd.push(Some(data)) }
         }
         // Band number i writes from `reach` rows above its first to as many below its last.
@@ -152,9 +152,10 @@ impl MotionOperator {
         x[..above].fill(0.0);
         for (phase, mut data) in [even, odd].into_iter().enumerate() {
             let from = (above + phase * band * stride).min(x.len());
-            let places = x[from..].par_chunks_mut(2 * band * stride);
-            data.resize_with(places.len(), || None);
-            places.zip(data).enumerate().for_each(|(i, (place, data))| {
+            let places = x[from..].chunks_mut(2 * band * stride);
+            let count = places.len();
+            data.resize_with(count, || None);
+            each(places.zip(data).enumerate(), count, |(i, (place, data))| {
                 if phase == 0 {
                     place.fill(0.0);
                 }
@@ -235,7 +236,7 @@ impl LinearOperator for MotionOperator {
             return self.adjoint(&weighted, out);
         }
         let (pad, chunk) = (self.pad, self.width * self.band());
-        let data = b.par_chunks_mut(chunk).zip(weights.par_chunks(chunk));
+        let data = b.chunks_mut(chunk).zip(weights.chunks(chunk));
         self.for_each_band(out, pad, data, |y, place, (b, weights)| {
             let mut scratch = Scratch::new();
             let mut x = Window { samples: x, stride: columns, start: (y + pad) * columns + pad };
@@ -249,6 +250,15 @@ impl LinearOperator for MotionOperator {
             }
         });
     }
+}
+
+/// Runs `task` on everything that `tasks` yields, about `count` of them, on all threads.
+fn each<T: Send>(tasks: impl Iterator<Item = T> + Send, count: usize, task: impl Fn(T) + Sync) {
+    let outcome = for_each_task(tasks, count, |item| {
+        task(item);
+        Ok(())
+    });
+    debug_assert!(outcome.is_ok(), "no task fails");
 }
 
 /// Whether row `y` has the paths of the row above, bit for bit.

@@ -9,11 +9,11 @@
 //! ask.
 
 use multiversion::multiversion;
-use rayon::prelude::*;
 
 use super::system::SystemRows;
 use crate::control::Control;
 use crate::error::Result;
+use crate::tasks::{cut, for_each_task, runs};
 
 /// Samples of a vector register of 512 bits, in f32: half-rows start and end at its multiples.
 pub(super) const LANES: usize = 16;
@@ -36,8 +36,8 @@ pub(super) const BLACK: usize = 9;
 /// Half-rows of a coefficient row.
 const HALF_ROWS: usize = 14;
 
-/// Rows that one task sorts: the diffusivities of the row before are made once more for each.
-const ROWS_PER_TASK: usize = 16;
+/// Fewest rows that one task sorts: the diffusivities of the row before are made once more for each.
+const FEWEST_ROWS: usize = 8;
 
 /// Half-rows of a field row.
 const FIELD_ROWS: usize = 4;
@@ -82,28 +82,24 @@ impl Layout {
         control: &Control,
     ) -> Result<()> {
         let inner = |row: usize| row..row * (self.height + 1);
-        coefficients[inner(self.block())]
-            .par_chunks_mut(ROWS_PER_TASK * self.block())
-            .zip(field[inner(self.rows())].par_chunks_mut(ROWS_PER_TASK * self.rows()))
-            .enumerate()
-            .try_for_each(|(task, (blocks, rows))| {
-                let first = task * ROWS_PER_TASK;
-                let mut made = MadeRows::new(self.width);
-                if first > 0 {
-                    made.before(system, [u, v], first);
-                }
-                let rows = rows.chunks_exact_mut(self.rows());
-                for (i, (block, rows)) in
-                    blocks.chunks_exact_mut(self.block()).zip(rows).enumerate()
-                {
-                    control.check()?;
-                    let y = first + i;
-                    made.next(system, [u, v], y, y + 1 == self.height);
-                    let row = y * self.width..(y + 1) * self.width;
-                    self.pack_row(&mut made, [&u[row.clone()], &v[row]], y % 2, block, rows);
-                }
-                Ok(())
-            })
+        let runs = runs(self.height, FEWEST_ROWS..=usize::MAX);
+        let blocks = cut(&mut coefficients[inner(self.block())], self.block(), &runs);
+        let rows = cut(&mut field[inner(self.rows())], self.rows(), &runs);
+        for_each_task(blocks.zip(rows), runs.len(), |((first, blocks), (_, rows))| {
+            let mut made = MadeRows::new(self.width);
+            if first > 0 {
+                made.before(system, [u, v], first);
+            }
+            let blocks = blocks.chunks_exact_mut(self.block());
+            for (i, (block, rows)) in blocks.zip(rows.chunks_exact_mut(self.rows())).enumerate() {
+                control.check()?;
+                let y = first + i;
+                made.next(system, [u, v], y, y + 1 == self.height);
+                let row = y * self.width..(y + 1) * self.width;
+                self.pack_row(&mut made, [&u[row.clone()], &v[row]], y % 2, block, rows);
+            }
+            Ok(())
+        })
     }
 
     fn pack_row(
@@ -144,18 +140,21 @@ impl Layout {
     }
 
     /// Writes the solution back in the order of the picture.
-    pub(super) fn unpack(&self, field: &[f32], u: &mut [f32], v: &mut [f32]) {
-        let rows = field[self.rows()..].par_chunks_exact(self.rows()).enumerate();
-        u.par_chunks_exact_mut(self.width)
-            .zip(v.par_chunks_exact_mut(self.width))
-            .zip(rows)
-            .with_min_len(LANES)
-            .for_each(|((u, v), (y, row))| {
+    pub(super) fn unpack(&self, field: &[f32], u: &mut [f32], v: &mut [f32]) -> Result<()> {
+        let field = &field[self.rows()..];
+        let runs = runs(self.height, FEWEST_ROWS..=usize::MAX);
+        let tasks = cut(u, self.width, &runs).zip(cut(v, self.width, &runs));
+        for_each_task(tasks, runs.len(), |((first, u), (_, v))| {
+            let rows = field[first * self.rows()..].chunks_exact(self.rows());
+            let lines = u.chunks_exact_mut(self.width).zip(v.chunks_exact_mut(self.width));
+            for (i, ((u, v), row)) in lines.zip(rows).enumerate() {
                 let half = |i: usize| &row[i * self.stride + LANES..(i + 1) * self.stride];
-                let order = if y % 2 == 0 { [0, 2] } else { [2, 0] };
+                let order = if (first + i) % 2 == 0 { [0, 2] } else { [2, 0] };
                 interleave(half(order[0]), half(order[1]), u);
                 interleave(half(order[0] + 1), half(order[1] + 1), v);
-            });
+            }
+            Ok(())
+        })
     }
 }
 

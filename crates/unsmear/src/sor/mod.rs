@@ -23,11 +23,9 @@ mod layout;
 mod relax;
 mod system;
 
-use rayon::iter::repeat_n;
-use rayon::prelude::*;
-
 use crate::control::Control;
 use crate::error::{Error, Result, require};
+use crate::tasks::{fill, filled, for_each_task};
 use layout::{LANES, Layout};
 use relax::{Band, relax_band};
 
@@ -38,9 +36,6 @@ const HALVES_PER_PASS: usize = 10;
 
 /// Fewest pixels worth a thread of their own: a pass over them takes some 40 us, ten times its scheduling.
 const PIXELS_PER_BAND: usize = 16384;
-
-/// Samples of fresh memory that one thread clears at a time: the system hands it out page by page meanwhile.
-const SAMPLES_AT_ONCE: usize = 1 << 16;
 
 /// Memory of [`solve`], 36 B/px; reusable between calls of any size.
 #[derive(Debug, Default)]
@@ -55,7 +50,7 @@ impl SorScratch {
     #[must_use]
     pub fn with_room(height: usize, width: usize) -> Self {
         let layout = Layout::new(height, width);
-        let room = |per_row: usize| Vec::with_capacity((height + 2) * per_row + LANES);
+        let room = |per_row: usize| filled(0.0, (height + 2) * per_row + LANES);
         Self {
             layout: Layout::default(),
             coefficients: room(layout.block()),
@@ -112,7 +107,11 @@ pub fn solve_rows(
         *former = layout;
         for (values, per_row) in [(&mut *coefficients, layout.block()), (field, layout.rows())] {
             let samples = (layout.height + 2) * per_row + LANES;
-            repeat_n(0.0, samples).with_min_len(SAMPLES_AT_ONCE).collect_into_vec(values);
+            if values.len() < samples {
+                *values = filled(0.0, samples);
+            } else {
+                fill(&mut values[..samples], 0.0);
+            }
         }
     }
     let (coefficients, field) = (aligned(coefficients), aligned(field));
@@ -121,8 +120,7 @@ pub fn solve_rows(
         let halves = HALVES_PER_PASS.min(2 * sweeps - first);
         relax_pass(&layout, coefficients, field, omega, first..first + halves, control)?;
     }
-    layout.unpack(field, u, v);
-    Ok(())
+    layout.unpack(field, u, v)
 }
 
 /// What follows the first sample that starts a register-sized piece of memory: loads across cache lines cost twice.
@@ -151,7 +149,8 @@ fn relax_pass(
         let start = if start == 0 { 1 } else { start + k + 1 };
         start..if end == rows { rows - 1 } else { end - k - 1 }
     };
-    split_rows(field, &bounds, layout.rows()).into_par_iter().try_for_each(|mut band| {
+    let parts = split_rows(field, &bounds, layout.rows());
+    for_each_task(parts.into_iter(), bands, |mut band| {
         relax_band(layout, coefficients, &mut band, shrinking, omega, halves.clone(), control)
     })?;
     // What was left out lies within `halves` rows of the inner bounds, each in the middle of one part.
@@ -159,14 +158,12 @@ fn relax_pass(
         .chain(bounds.windows(2).map(|pair| pair[0].midpoint(pair[1])))
         .chain([rows])
         .collect();
-    split_rows(field, &middles, layout.rows())
-        .into_par_iter()
-        .zip(&bounds)
-        .filter(|(_, bound)| 0 < **bound && **bound < rows)
-        .try_for_each(|(mut band, &bound)| {
-            let growing = |_: &Band<'_>, k: usize| bound - k - 1..bound + k + 1;
-            relax_band(layout, coefficients, &mut band, growing, omega, halves.clone(), control)
-        })
+    let parts = split_rows(field, &middles, layout.rows()).into_iter().zip(&bounds);
+    let inner = parts.filter(|(_, bound)| 0 < **bound && **bound < rows);
+    for_each_task(inner, bands - 1, |(mut band, &bound)| {
+        let growing = |_: &Band<'_>, k: usize| bound - k - 1..bound + k + 1;
+        relax_band(layout, coefficients, &mut band, growing, omega, halves.clone(), control)
+    })
 }
 
 /// Cuts the rows of `field` at `bounds`, which run from 0 to their number.

@@ -18,16 +18,20 @@ mod middle;
 mod parameters;
 mod window;
 
-use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 use crate::control::Control;
 use crate::error::{Error, Result, require};
+use crate::tasks::{cut, for_each_task, runs};
 use window::{Window, Workspace};
 
 pub use parameters::WeightedMedian;
 
 /// Largest radius, px: a window beyond it smears more than it decides, and the sums of its weights stay below 2^24.
 const LARGEST_RADIUS: usize = 15;
+
+/// Rows per task: most of the work may lie in few of them.
+const ROWS: RangeInclusive<usize> = 1..=16;
 
 /// Filters (`u`, `v`) where `mask` holds and copies the rest; see the [module](self).
 ///
@@ -66,17 +70,20 @@ pub fn weighted_median(
         return Ok(());
     }
     let window = Window::new(parameters, [u, v], guide, height, width);
-    out_u.par_chunks_mut(width).zip(out_v.par_chunks_mut(width)).enumerate().try_for_each_init(
-        || Workspace::new(parameters.radius),
-        |workspace, (y, (out_u, out_v))| {
+    let runs = runs(height, ROWS);
+    let tasks = cut(out_u, width, &runs).zip(cut(out_v, width, &runs));
+    for_each_task(tasks, runs.len(), |((first, out_u), (_, out_v))| {
+        let mut workspace = Workspace::new(parameters.radius);
+        let lines = out_u.chunks_exact_mut(width).zip(out_v.chunks_exact_mut(width));
+        for (y, (out_u, out_v)) in (first..).zip(lines) {
             control.check()?;
             let row = y * width..(y + 1) * width;
             out_u.copy_from_slice(&u[row.clone()]);
             out_v.copy_from_slice(&v[row.clone()]);
-            window.filter_row(&mask[row], y, workspace, out_u, out_v);
-            Ok(())
-        },
-    )
+            window.filter_row(&mask[row], y, &mut workspace, out_u, out_v);
+        }
+        Ok(())
+    })
 }
 
 impl WeightedMedian {

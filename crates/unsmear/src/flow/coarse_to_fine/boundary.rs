@@ -7,6 +7,8 @@
 //! with the gradient by Sobel's masks over 8, px/frame per px, reflected at the edge. Only there is
 //! the weighted median worth its price: elsewhere it returns what it is given.
 
+use multiversion::multiversion;
+
 use crate::array::for_each_row;
 use crate::border::Border;
 use crate::control::Control;
@@ -32,14 +34,11 @@ pub(super) fn boundaries(
     let mut steep = vec![false; height * width];
     for_each_row(&mut steep, width, control, |y, out| {
         let rows = [-1, 0, 1].map(|j| mirror(y as isize + j, height) * width);
-        for (x, out) in out.iter_mut().enumerate() {
-            let inner = x > 0 && x + 1 < width;
-            let at = if inner {
-                [x - 1, x, x + 1]
-            } else {
-                [-1, 0, 1].map(|i| mirror(x as isize + i, width))
-            };
-            *out = flow.iter().any(|plane| sobel(plane, rows, at) > limit * limit);
+        let [u, v] = flow.map(|plane| rows.map(|start| &plane[start..start + width]));
+        steep_inside(u, v, limit * limit, out);
+        for x in [0, width - 1] {
+            let at = [-1, 0, 1].map(|i| mirror(x as isize + i, width));
+            out[x] = [u, v].iter().any(|rows| sobel(*rows, at) > limit * limit);
         }
     })?;
     let mut across = vec![false; height * width];
@@ -59,10 +58,19 @@ pub(super) fn boundaries(
     Ok(steep)
 }
 
-/// Squared gradient of a plane at rows starting at `rows` and columns `at`.
+/// Where the square of a gradient is beyond `limit`, but for the first and the last column.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn steep_inside(u: [&[f32]; 3], v: [&[f32]; 3], limit: f32, out: &mut [bool]) {
+    for x in 1..out.len().saturating_sub(1) {
+        let at = [x - 1, x, x + 1];
+        out[x] = (sobel(u, at) > limit) | (sobel(v, at) > limit);
+    }
+}
+
+/// Squared gradient from the rows above, here and below at columns `at`.
 #[inline(always)]
-fn sobel(plane: &[f32], rows: [usize; 3], at: [usize; 3]) -> f32 {
-    let [above, here, below] = rows.map(|start| at.map(|x| plane[start + x]));
+fn sobel(rows: [&[f32]; 3], at: [usize; 3]) -> f32 {
+    let [above, here, below] = rows.map(|row| at.map(|x| row[x]));
     let gx = above[2] - above[0] + 2.0 * (here[2] - here[0]) + below[2] - below[0];
     let gy = below[0] - above[0] + 2.0 * (below[1] - above[1]) + below[2] - above[2];
     (gx * gx + gy * gy) * (1.0 / 64.0)

@@ -23,6 +23,7 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::pyramid::smooth;
+use crate::tasks::filled;
 
 /// Ratio of the mean mismatches above which several frames are given up.
 const WORST_RATIO: f64 = 1.15;
@@ -72,7 +73,7 @@ pub(super) fn mismatch(
     control: &Control,
 ) -> Result<Mismatch> {
     let (count, width) = (look.filters(), look.width);
-    let mut sums = [(); SUMS].map(|()| vec![0.0; look.height * width]);
+    let mut sums = [(); SUMS].map(|()| filled(0.0, look.height * width));
     let planes = sums.each_mut().map(|plane| &mut plane[..]);
     let scratch = || vec![0.0; count * TERMS * width];
     look.for_each_row(planes, [width; SUMS], control, scratch, |y, pair, seen, rows, terms| {

@@ -23,7 +23,7 @@
 //! 10.1109/TPAMI.2012.171) compares such signs.
 
 use multiversion::multiversion;
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2};
 
 use super::look::Look;
 use crate::array::for_each_row;
@@ -31,6 +31,7 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::pyramid::smooth;
+use crate::tasks::filled_picture;
 
 /// Deviations of the averages of coherence, of the flow's gradient and disagreement, and of `A`, px.
 const SIGMA: [f64; 3] = [1.5, 2.0, 3.0];
@@ -95,74 +96,91 @@ fn compare(responses: [(&[f32], &[f32]); 2], alike: &mut [f32], power: &mut [f32
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn confidence(clues: &Clues<'_>, control: &Control) -> Result<Array2<f32>> {
-    let mut trust = smooth(clues.coherence.view(), SIGMA[0], control)?;
-    trust.mapv_inplace(|c| c.clamp(0.0, 1.0).sqrt());
-    let mut loss = steepness(clues.flow, control)?;
-    loss.mapv_inplace(|slope| GRADIENT_LOSS * slope);
-    if let Some(coarser) = clues.coarser {
-        let factor = DISAGREEMENT_LOSS * clues.zoom;
-        for (loss, (here, there)) in loss.iter_mut().zip(pairs(clues.flow, coarser)) {
-            let (du, dv) = (here[0] - there[0], here[1] - there[1]);
-            *loss += factor * (du * du + dv * dv).sqrt();
-        }
-    }
-    let loss = smooth(loss.view(), SIGMA[1], control)?;
-    Zip::from(&mut trust).and(&loss).for_each(|trust, loss| *trust *= (-loss).exp());
-    let resolved = least_eigenvalue(clues.matrix, trust.dim(), control)?;
-    Zip::from(&mut trust).and(&resolved).for_each(|trust, l| *trust *= l / (l + RESOLVED));
-    Ok(trust)
-}
-
-/// The components of two flows, pixel by pixel.
-fn pairs<'a>(
-    one: &'a FlowField<f32>,
-    other: &'a FlowField<f32>,
-) -> impl Iterator<Item = ([f32; 2], [f32; 2])> + 'a {
-    let vectors = |flow: &'a FlowField<f32>| flow.u.iter().zip(&flow.v).map(|(&u, &v)| [u, v]);
-    vectors(one).zip(vectors(other))
-}
-
-/// The smaller eigenvalue of the averaged matrix, at least 0.
-fn least_eigenvalue(
-    [a11, a12, a22]: [&[f32]; 3],
-    size: (usize, usize),
-    control: &Control,
-) -> Result<Array2<f32>> {
+    let coherence = smooth(clues.coherence.view(), SIGMA[0], control)?;
+    let loss = smooth(loss(clues, control)?.view(), SIGMA[1], control)?;
+    let size = loss.dim();
     let averaged = |plane: &[f32]| match ArrayView2::from_shape(size, plane) {
         Ok(view) => smooth(view, SIGMA[2], control),
         Err(_) => Ok(Array2::zeros(size)),
     };
-    let (a11, a12) = (averaged(a11)?, averaged(a12)?);
-    let mut a22 = averaged(a22)?;
-    Zip::from(&mut a22).and(&a11).and(&a12).for_each(|a22, a11, a12| {
-        let (mean, half) = (0.5 * (a11 + *a22), 0.5 * (a11 - *a22));
-        *a22 = (mean - (half * half + a12 * a12).sqrt()).max(0.0);
-    });
-    Ok(a22)
+    let [a11, a12, a22] = clues.matrix;
+    let (a11, a12, a22) = (averaged(a11)?, averaged(a12)?, averaged(a22)?);
+    let planes = [&loss, &a11, &a12, &a22].map(|plane| plane.as_slice().unwrap_or_default());
+    let mut trust = coherence;
+    for_each_row(trust.as_slice_mut().unwrap_or_default(), size.1, control, |y, trust| {
+        let [loss, a11, a12, a22] = planes.map(|plane| &plane[y * size.1..(y + 1) * size.1]);
+        for (x, trust) in trust.iter_mut().enumerate() {
+            let resolved = least_eigenvalue(a11[x], a12[x], a22[x]);
+            *trust = trust.clamp(0.0, 1.0).sqrt() * (-loss[x]).exp();
+            *trust *= resolved / (resolved + RESOLVED);
+        }
+    })?;
+    Ok(trust)
+}
+
+/// The smaller eigenvalue, at least 0.
+fn least_eigenvalue(a11: f32, a12: f32, a22: f32) -> f32 {
+    let (mean, half) = (0.5 * (a11 + a22), 0.5 * (a11 - a22));
+    (mean - (half * half + a12 * a12).sqrt()).max(0.0)
+}
+
+/// What steepness and disagreement take, before it is averaged.
+fn loss(clues: &Clues<'_>, control: &Control) -> Result<Array2<f32>> {
+    let mut loss = steepness(clues.flow, control)?;
+    let (factor, width) = (DISAGREEMENT_LOSS * clues.zoom, loss.ncols());
+    // Without a coarser level nothing disagrees.
+    let flows = [clues.flow, clues.coarser.unwrap_or(clues.flow)];
+    let planes = flows.map(|f| [&f.u, &f.v].map(|plane| plane.as_slice().unwrap_or_default()));
+    for_each_row(loss.as_slice_mut().unwrap_or_default(), width, control, |y, loss| {
+        let [here, there] = planes.map(|flow| flow.map(|c| &c[y * width..(y + 1) * width]));
+        weigh_loss(here, there, factor, loss);
+    })?;
+    Ok(loss)
+}
+
+/// From steepness to the loss, with `factor` times the distance of two flows.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn weigh_loss(here: [&[f32]; 2], there: [&[f32]; 2], factor: f32, loss: &mut [f32]) {
+    let n = loss.len();
+    let ([u, v], [cu, cv]) = (here.map(|c| &c[..n]), there.map(|c| &c[..n]));
+    for x in 0..n {
+        let (du, dv) = (u[x] - cu[x], v[x] - cv[x]);
+        loss[x] = GRADIENT_LOSS * loss[x] + factor * (du * du + dv * dv).sqrt();
+    }
 }
 
 /// `|grad (u, v)|` by central differences, one-sided at the edge.
 fn steepness(flow: &FlowField<f32>, control: &Control) -> Result<Array2<f32>> {
     let (height, width) = flow.dim();
     let planes = [&flow.u, &flow.v].map(|plane| plane.as_slice().unwrap_or_default());
-    let span = |i: usize, n: usize| (i.saturating_sub(1), (i + 1).min(n - 1));
-    let mut out = Array2::zeros((height, width));
+    let mut out = filled_picture(0.0, (height, width));
     for_each_row(out.as_slice_mut().unwrap_or_default(), width, control, |y, out| {
-        let (y0, y1) = span(y, height);
-        let down = 1.0 / (y1 - y0).max(1) as f32;
-        for plane in planes {
-            let row = |y: usize| &plane[y * width..(y + 1) * width];
-            let (above, here, below) = (row(y0), row(y), row(y1));
-            for (x, out) in out.iter_mut().enumerate() {
-                let (x0, x1) = span(x, width);
-                let gx = (here[x1] - here[x0]) / (x1 - x0).max(1) as f32;
-                let gy = (below[x] - above[x]) * down;
-                *out += gx * gx + gy * gy;
-            }
-        }
-        out.iter_mut().for_each(|square: &mut f32| *square = square.sqrt());
+        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+        let down = 1.0 / (rows[2] - rows[0]).max(1) as f32;
+        let [u, v] = planes.map(|plane| rows.map(|y| &plane[y * width..(y + 1) * width]));
+        slopes(u, v, down, out);
     })?;
     Ok(out)
+}
+
+/// `|grad (u, v)|` of a row from the rows above, here and below.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn slopes(u: [&[f32]; 3], v: [&[f32]; 3], down: f32, out: &mut [f32]) {
+    let n = out.len();
+    let ([u0, u1, u2], [v0, v1, v2]) = (u.map(|row| &row[..n]), v.map(|row| &row[..n]));
+    for x in 1..n.saturating_sub(1) {
+        let (ux, vx) = (0.5 * (u1[x + 1] - u1[x - 1]), 0.5 * (v1[x + 1] - v1[x - 1]));
+        out[x] = ux * ux + vx * vx;
+    }
+    let last = n - 1;
+    for (x, from, to) in [(0, 0, 1.min(last)), (last, last.saturating_sub(1), last)] {
+        let (ux, vx) = (u1[to] - u1[from], v1[to] - v1[from]);
+        out[x] = ux * ux + vx * vx;
+    }
+    for x in 0..n {
+        let (uy, vy) = ((u2[x] - u0[x]) * down, (v2[x] - v0[x]) * down);
+        out[x] = (out[x] + (uy * uy + vy * vy)).sqrt();
+    }
 }
 
 #[cfg(test)]

@@ -11,13 +11,12 @@
 use std::f32::consts::PI;
 
 use multiversion::multiversion;
-use rayon::iter::repeat_n;
-use rayon::prelude::*;
 
 use super::look::Look;
 use super::phase_constraint::{Filters, TERMS};
 use crate::control::Control;
 use crate::error::Result;
+use crate::tasks::filled;
 
 /// `Q`.
 const LARGEST: f32 = 32767.0;
@@ -34,9 +33,6 @@ pub(super) struct Units {
     pub(super) root: f32,
 }
 
-/// Samples of fresh memory that one thread clears at a time.
-const SAMPLES_AT_ONCE: usize = 1 << 17;
-
 /// Rows `[G_x, G_y, D, sqrt W]` of each filter, (H, N, 4, W).
 #[derive(Debug)]
 pub(super) struct Constraints {
@@ -51,7 +47,7 @@ impl Constraints {
     /// None yet, with room for pictures of up to `samples` pixels.
     pub(super) fn with_room(filters: usize, samples: usize) -> Self {
         let units = Units { slope: 0.0, step: PI / LARGEST, root: 1.0 / LARGEST };
-        Self { terms: Vec::with_capacity(samples * filters * TERMS), units, stride: 0, filters }
+        Self { terms: filled(0, samples * filters * TERMS), units, stride: 0, filters }
     }
 
     /// Fills them with those of a look.
@@ -67,13 +63,13 @@ impl Constraints {
         self.units.slope = filters.largest_slope() / LARGEST;
         self.stride = TERMS * look.width;
         let samples = look.height * self.filters * self.stride;
-        if self.terms.len() != samples {
-            repeat_n(0, samples).with_min_len(SAMPLES_AT_ONCE).collect_into_vec(&mut self.terms);
+        if self.terms.len() < samples {
+            self.terms = filled(0, samples);
         }
         let (units, per_row) = (self.units, self.filters * self.stride);
         let scratch = || vec![0.0; per_row];
         look.for_each_row(
-            [&mut self.terms],
+            [&mut self.terms[..samples]],
             [per_row],
             control,
             scratch,

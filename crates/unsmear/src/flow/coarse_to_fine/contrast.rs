@@ -24,6 +24,7 @@ use super::recorded::{Reading, Sample, read_row};
 use crate::array::for_each_row_with;
 use crate::control::Control;
 use crate::error::Result;
+use crate::tasks::filled_picture;
 
 /// Standard deviation after standardising, grey levels.
 const TYPICAL: f64 = 64.0;
@@ -99,7 +100,7 @@ impl Contrast {
         control: &Control,
     ) -> Result<(Array2<f32>, bool)> {
         let (height, width, _) = frame.dim();
-        let mut out = Array2::zeros((height, width));
+        let mut out = filled_picture(0.0, (height, width));
         let unknown = AtomicBool::new(false);
         let samples = out.as_slice_mut().unwrap_or_default();
         for_each_row_with(

@@ -6,8 +6,9 @@
 //! is smooth, and 0 where it is flat. Pull to rest and precision (see [`super::still`],
 //! [`super::precision`]) do not add to it: both reach out from patterns nearby.
 
-use ndarray::{Array2, Zip};
+use ndarray::Array2;
 
+use crate::array::for_each_row;
 use crate::control::Control;
 use crate::error::Result;
 use crate::pyramid::{Resampling, resample, smooth};
@@ -28,8 +29,13 @@ pub(super) fn gather(
 ) -> Result<Array2<f32>> {
     let here = smooth(trace.view(), REACH, control)?;
     let Some(coarser) = coarser else { return Ok(here) };
-    let coarser = resample(coarser.view(), here.dim(), Resampling::Linear, control)?;
-    Ok(Zip::from(&here).and(&coarser).map_collect(|a, b| a.max(*b)))
+    let mut most = resample(coarser.view(), here.dim(), Resampling::Linear, control)?;
+    let (samples, width) = (here.as_slice().unwrap_or_default(), here.ncols());
+    for_each_row(most.as_slice_mut().unwrap_or_default(), width, control, |y, most| {
+        let here = &samples[y * width..(y + 1) * width];
+        most.iter_mut().zip(here).for_each(|(most, here)| *most = here.max(*most));
+    })?;
+    Ok(most)
 }
 
 #[cfg(test)]

@@ -28,8 +28,9 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::gabor::GaborBank;
-use crate::gabor::stream::{BAND, ResponseRows};
+use crate::gabor::stream::{FEWEST_ROWS, ResponseRows};
 use crate::interpolate::{SplineDegree, SplineImage};
+use crate::tasks::{copied, filled, filled_picture};
 
 /// Sums side by side: as many as a register of 512 bits holds.
 const LANES: usize = 16;
@@ -137,19 +138,34 @@ impl<'a> Level<'a> {
         };
         let mut warped = target.image.warp(along.view(), control)?;
         keep_what_rests(&mut warped, picture, along, control)?;
-        let mut visible = vec![0.0; self.height * self.width];
+        let mut visible = filled(0.0, self.height * self.width);
         see(along, coverage.as_ref(), &mut visible, control)?;
+        Ok(self.beside_the_reference(warped.into_raw_vec_and_offset().0, visible))
+    }
+
+    /// Looks at a frame as it is: what no flow would show.
+    fn look_unmoved(&self, target: &Target<'_>) -> Look<'_> {
+        let Frame { picture, ref coverage, .. } = *target.frame;
+        let visible = coverage.as_ref().map_or_else(
+            || filled(1.0, self.height * self.width),
+            |coverage| copied(coverage.as_slice().unwrap_or_default()),
+        );
+        self.beside_the_reference(copied(picture.as_slice().unwrap_or_default()), visible)
+    }
+
+    /// A frame and the weights of its pixels, which count as far as the reference's own are known.
+    fn beside_the_reference(&self, warped: Vec<f32>, mut visible: Vec<f32>) -> Look<'_> {
         if let Some(coverage) = self.coverage {
             visible.iter_mut().zip(coverage).for_each(|(seen, c)| *seen *= c);
         }
-        Ok(Look {
+        Look {
             bank: &self.settings.bank,
             reference: self.reference,
-            warped: warped.into_raw_vec_and_offset().0,
+            warped,
             visible,
             height: self.height,
             width: self.width,
-        })
+        }
     }
 
     /// What the filters need for the frame at `offset`.
@@ -173,8 +189,7 @@ impl<'a> Level<'a> {
     pub(super) fn look_for_rest(&self, control: &Control) -> Result<Option<Rest>> {
         let next = self.others.iter().find(|target| target.frame.offset == 1.0);
         let Some(target) = next.filter(|_| self.settings.still) else { return Ok(None) };
-        let zero = || Array2::zeros((self.height, self.width));
-        let look = self.look(target, &FlowField { u: zero(), v: zero() }, control)?;
+        let look = self.look_unmoved(target);
         let (floor, k0) = (self.weighting.floor, wavenumber(&self.settings.bank));
         look_for_rest(&look, &self.filters(1.0), floor, k0, self.zoom, control).map(Some)
     }
@@ -197,7 +212,7 @@ impl<'a> Level<'a> {
         flow: &FlowField<f32>,
         control: &Control,
     ) -> Result<Array2<f32>> {
-        let mut sum = Array2::zeros(flow.dim());
+        let mut sum = filled_picture(0.0, flow.dim());
         let share = 1.0 / self.others.len() as f32;
         for target in &self.others {
             let look = self.look(target, flow, control)?;
@@ -228,7 +243,7 @@ fn mean_power(
 ) -> Result<f64> {
     let row = 2 * bank.wavevectors().len() * width;
     let mut sums = vec![0.0f32; picture.len() / width];
-    for_each_band([&mut sums], [1], BAND, control, |first, [sums]| {
+    for_each_band([&mut sums], [1], FEWEST_ROWS..=usize::MAX, control, |first, [sums]| {
         let mut rows = ResponseRows::new(bank, picture, width, Border::Reflect, first);
         let mut responses = vec![0.0; row];
         for (i, sum) in sums.iter_mut().enumerate() {

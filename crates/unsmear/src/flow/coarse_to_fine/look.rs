@@ -4,8 +4,8 @@
 //! of each stay in cache, and nothing of the size of the picture is kept but the warped frame and the weights of its
 //! pixels. Both frames are filtered anew in every look: arithmetic instead of memory.
 //!
-//! Bands of [`BAND`] rows are independent of each other, the rows that two of them need are filtered twice, and the
-//! results do not depend on who does which band.
+//! Runs of rows are independent of each other, what two of them need is filtered twice, and the
+//! results do not depend on who does which.
 
 use super::response_pair::ResponsePair;
 use super::rows::{for_each_band, row_of};
@@ -13,7 +13,7 @@ use crate::border::Border;
 use crate::control::Control;
 use crate::error::Result;
 use crate::gabor::GaborBank;
-use crate::gabor::stream::{BAND, ResponseRows};
+use crate::gabor::stream::{FEWEST_ROWS, ResponseRows};
 
 /// Rows of responses that are kept: above, here and below.
 const KEPT: usize = 3;
@@ -36,7 +36,7 @@ impl Look<'_> {
     }
 
     /// Runs `row(y, responses, weights, rows, scratch)` for every row of `N` packed planes with rows of `widths`
-    /// samples, `scratch` made once for each band.
+    /// samples, `scratch` made once for each run.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled); the planes are then undefined.
@@ -49,7 +49,7 @@ impl Look<'_> {
         row: impl Fn(usize, &ResponsePair<'_>, &[f32], [&mut [T]; N], &mut S) + Sync,
     ) -> Result<()> {
         let (width, last) = (self.width, self.height - 1);
-        for_each_band(planes, widths, BAND, control, |first, mut band| {
+        for_each_band(planes, widths, FEWEST_ROWS..=usize::MAX, control, |first, mut band| {
             let mut frames =
                 [self.reference, &self.warped].map(|p| Kept::new(self.bank, p, width, first));
             let mut scratch = scratch();
@@ -105,6 +105,7 @@ impl<'a> Kept<'a> {
 mod tests {
     use super::*;
     use crate::gabor::GaborParameters;
+    use crate::tasks::runs;
     use ndarray::Array2;
 
     /// What a look shows of both frames is what the bank answers to the whole of them.
@@ -143,7 +144,10 @@ mod tests {
                 },
             )
             .unwrap();
-            assert!(seen.iter().enumerate().all(|(y, &count)| count == y % BAND + 1));
+            // A scratch serves for a run.
+            let runs = runs(height, FEWEST_ROWS..=usize::MAX);
+            let expected: Vec<usize> = runs.iter().flat_map(|&run| 1..=run).collect();
+            assert_eq!(seen, expected);
         }
     }
 }

@@ -13,8 +13,10 @@
 //! things that move far are missed. Frames beyond two assume constant motion.
 //! Sources: Fleet & Jepson 1990 (doi 10.1007/BF00056772) for the constraint; see the modules.
 
+use multiversion::multiversion;
 use ndarray::{Array2, s};
 
+use crate::awake::awake;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow::Estimate;
@@ -107,12 +109,14 @@ impl CoarseToFine {
         let ways = [*sequence, reversed];
         let ways = &ways[..=usize::from(self.forward_backward)];
         control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
-        let (mut estimate, levels) = self.one_way(sequence, true, control)?;
-        for way in &ways[1..] {
-            let (back, _) = self.one_way(way, false, control)?;
-            check_round_trip(&mut estimate, &back.flow, control)?;
-        }
-        Ok((estimate, levels))
+        awake(|| {
+            let (mut estimate, levels) = self.one_way(sequence, true, control)?;
+            for way in &ways[1..] {
+                let (back, _) = self.one_way(way, false, control)?;
+                check_round_trip(&mut estimate, &back.flow, control)?;
+            }
+            Ok((estimate, levels))
+        })
     }
 
     /// Number of warps, the unit of progress.
@@ -248,13 +252,21 @@ fn descend(summit: &Summit, size: (usize, usize), control: &Control) -> Result<E
     let evidence = larger(&summit.evidence)?;
     let planes = [&mut flow.u, &mut flow.v, &mut confidence]
         .map(|plane| plane.as_slice_mut().unwrap_or_default());
+    let evidence = evidence.as_slice().unwrap_or_default();
     for_each_rows(planes, [size.1; 3], control, |y, [u, v, c]| {
-        for (x, &e) in evidence.row(y).iter().enumerate() {
-            let known = e >= LEAST_EVIDENCE;
-            u[x] = if known { u[x] } else { f32::NAN };
-            v[x] = if known { v[x] } else { f32::NAN };
-            c[x] = if known { c[x].clamp(LEAST_CONFIDENCE, 1.0) } else { 0.0 };
-        }
+        keep_known(&evidence[y * size.1..(y + 1) * size.1], u, v, c);
     })?;
     Ok(Estimate { flow, confidence })
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn keep_known(evidence: &[f32], u: &mut [f32], v: &mut [f32], confidence: &mut [f32]) {
+    let n = evidence.len();
+    let (u, v, confidence) = (&mut u[..n], &mut v[..n], &mut confidence[..n]);
+    for x in 0..n {
+        let known = evidence[x] >= LEAST_EVIDENCE;
+        u[x] = if known { u[x] } else { f32::NAN };
+        v[x] = if known { v[x] } else { f32::NAN };
+        confidence[x] = if known { confidence[x].clamp(LEAST_CONFIDENCE, 1.0) } else { 0.0 };
+    }
 }

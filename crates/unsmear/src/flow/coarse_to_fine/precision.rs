@@ -28,6 +28,7 @@ use super::rows::for_each_rows;
 use crate::control::Control;
 use crate::error::Result;
 use crate::pyramid::smooth;
+use crate::tasks::filled;
 
 /// Trace of the data term of ordinary texture, up to which data are raised.
 const FULL_TRACE: f32 = 0.3;
@@ -55,7 +56,7 @@ pub(super) fn precision(
     control: &Control,
 ) -> Result<()> {
     let samples = out.len();
-    let (mut residual, mut trace) = (vec![0.0; samples], vec![0.0; samples]);
+    let (mut residual, mut trace) = (filled(0.0, samples), filled(0.0, samples));
     let sums = [&mut residual[..], &mut *out, &mut trace[..]];
     for_each_rows(sums, [width; 3], control, |y, [residual, weight, trace]| {
         residual.fill(0.0);

@@ -34,6 +34,7 @@ use crate::error::Result;
 use crate::flow_field::FlowField;
 use crate::median::median_5x5;
 use crate::sor::{SorScratch, SystemRows, solve_rows};
+use crate::tasks::{copied, filled, filled_picture};
 use crate::weighted_median::{WeightedMedian, weighted_median};
 
 /// Largest change of a flow component by one warp, px: below half the wavelength of 4 px.
@@ -44,8 +45,6 @@ const RELAXATION: f32 = 1.9;
 const BOUNDARY: f32 = 0.1;
 /// Spatial deviation of the weighted median, in radii.
 const MEDIAN_SPREAD: f32 = 0.8;
-/// Rows of a band where each has memory of its own.
-const BAND: usize = 32;
 /// Samples handled together: a register of 512 bits.
 const LANES: usize = 16;
 
@@ -119,8 +118,9 @@ impl Level<'_> {
     ) -> Result<Refined> {
         let samples = self.height * self.width;
         let mut weights = Weights {
-            springs: springs.map_or_else(|| vec![0.0; samples], |s| s.into_raw_vec_and_offset().0),
-            gain: vec![1.0; samples],
+            springs: springs
+                .map_or_else(|| filled(0.0, samples), |s| s.into_raw_vec_and_offset().0),
+            gain: filled(1.0, samples),
         };
         let mut changes = Vec::with_capacity(warps);
         let mut matrix = [(); 3].map(|()| Vec::new());
@@ -136,7 +136,7 @@ impl Level<'_> {
             workspace.constraints.clear();
         }
         let [a11, _, a22] = &matrix;
-        let mut trace = Array2::zeros((self.height, self.width));
+        let mut trace = filled_picture(0.0, (self.height, self.width));
         let plane = trace.as_slice_mut().unwrap_or_default();
         for_each_rows([plane], [self.width], control, |y, [trace]| {
             for (x, trace) in trace.iter_mut().enumerate() {
@@ -169,7 +169,7 @@ impl Level<'_> {
         if self.settings.precision > 0.0 {
             precision(&frames, width, self.settings.precision, scale, gain, control)?;
         }
-        let (mut u, mut v) = (start_u.to_vec(), start_v.to_vec());
+        let (mut u, mut v) = (copied(start_u), copied(start_v));
         let data = DataTerm {
             frames,
             warped_with: [start_u, start_v],
@@ -212,7 +212,8 @@ impl Level<'_> {
         let mask = boundaries([u, v], self.width, BOUNDARY, control)?;
         let guide = median_guide(self.channels, control)?;
         let guide: Vec<&[f32]> = guide.iter().map(|c| c.as_slice().unwrap_or_default()).collect();
-        let mut out = FlowField { u: flow.u.clone(), v: flow.v.clone() };
+        let [u_out, v_out] = [(); 2].map(|()| filled_picture(0.0, flow.dim()));
+        let mut out = FlowField { u: u_out, v: v_out };
         let (out_u, out_v) = (&mut out.u, &mut out.v);
         weighted_median(
             u,
@@ -233,17 +234,23 @@ impl Level<'_> {
 /// `a11, a12, a22` of the data terms at `flow`.
 fn matrix_of(data: &DataTerm<'_>, flow: Planes<'_>, control: &Control) -> Result<[Vec<f32>; 3]> {
     let width = data.width;
-    let mut matrix = [(); 3].map(|()| vec![0.0; flow[0].len()]);
+    let mut matrix = [(); 3].map(|()| filled(0.0, flow[0].len()));
     let planes = matrix.each_mut().map(|plane| &mut plane[..]);
-    for_each_band(planes, [width; 3], BAND, control, |first, mut band| {
-        let (mut c1, mut c2) = (vec![0.0; width], vec![0.0; width]);
-        for i in 0..band[0].len() / width {
-            control.check()?;
-            let [a11, a12, a22] = row_of(&mut band, [width; 3], i);
-            data.equations(first + i, flow, [a11, a12, a22, &mut c1, &mut c2]);
-        }
-        Ok(())
-    })?;
+    for_each_band(
+        planes,
+        [width; 3],
+        crate::array::FEWEST_ROWS..=usize::MAX,
+        control,
+        |first, mut band| {
+            let (mut c1, mut c2) = (vec![0.0; width], vec![0.0; width]);
+            for i in 0..band[0].len() / width {
+                control.check()?;
+                let [a11, a12, a22] = row_of(&mut band, [width; 3], i);
+                data.equations(first + i, flow, [a11, a12, a22, &mut c1, &mut c2]);
+            }
+            Ok(())
+        },
+    )?;
     Ok(matrix)
 }
 

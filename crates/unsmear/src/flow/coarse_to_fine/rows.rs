@@ -3,14 +3,12 @@
 //! As [`crate::array::for_each_row`], for kernels whose results are separate planes. Each plane is
 //! its own slice, so that the compiler knows that writing one does not change another.
 
-use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
-use crate::array::FEW;
+use crate::array::{FEW, FEWEST_ROWS};
 use crate::control::Control;
 use crate::error::Result;
-
-/// Rows per task; see [`crate::array`].
-const ROWS_PER_TASK: usize = 8;
+use crate::tasks::{for_each_task, runs};
 
 /// Two packed planes (H, W): the components of a flow, or weights along x and along y.
 pub(super) type Planes<'a> = [&'a [f32]; 2];
@@ -27,8 +25,8 @@ pub(super) fn for_each_rows<const N: usize>(
 ) -> Result<()> {
     // Few samples are not worth a second thread.
     let few = planes[0].len() <= FEW;
-    let height = if few { planes[0].len() } else { ROWS_PER_TASK };
-    for_each_band(planes, widths, height, control, |first, mut band| {
+    let fewest = if few { usize::MAX } else { FEWEST_ROWS };
+    for_each_band(planes, widths, fewest..=usize::MAX, control, |first, mut band| {
         for i in 0..band[0].len() / widths[0] {
             control.check()?;
             row(first + i, row_of(&mut band, widths, i));
@@ -51,35 +49,36 @@ pub(super) fn row_of<'a, T, const N: usize>(
     })
 }
 
-/// Runs `band(first, rows)` for every `height` rows, or what is left of them, of `N` packed planes
-/// with rows of `widths` samples; `first` is the number of the first row.
+/// Runs `band(first, rows)` for runs of `within` rows (see [`runs`]), which cover `N` packed planes with rows of `widths`
+/// samples; `first` is the number of the first row.
 ///
 /// # Errors
 /// What `band` returns; the planes are then undefined.
 pub(super) fn for_each_band<T: Send, const N: usize>(
     planes: [&mut [T]; N],
     widths: [usize; N],
-    height: usize,
+    within: RangeInclusive<usize>,
     control: &Control,
     band: impl Fn(usize, [&mut [T]; N]) -> Result<()> + Sync,
 ) -> Result<()> {
-    let mut tasks: Vec<[&mut [T]; N]> = Vec::new();
+    let rows = planes.iter().zip(widths).map(|(plane, width)| plane.len() / width.max(1)).min();
+    let runs = runs(rows.unwrap_or(0), within);
     let mut rest = planes;
-    while rest.iter().zip(widths).all(|(plane, width)| width > 0 && !plane.is_empty()) {
+    let mut first = 0;
+    let bands = runs.iter().map(|run| {
         let mut at = 0;
-        let mut task: [&mut [T]; N] = [(); N].map(|()| [].as_mut_slice());
-        rest = rest.map(|plane| {
-            let count = (height * widths[at]).min(plane.len());
-            let (head, tail) = plane.split_at_mut(count);
-            task[at] = head;
+        let band = rest.each_mut().map(|plane| {
             at += 1;
-            tail
+            let (head, tail) = std::mem::take(plane).split_at_mut(run * widths[at - 1]);
+            *plane = tail;
+            head
         });
-        tasks.push(task);
-    }
-    tasks.into_par_iter().enumerate().try_for_each(|(number, planes)| {
+        first += run;
+        (first - run, band)
+    });
+    for_each_task(bands, runs.len(), |(first, planes)| {
         control.check()?;
-        band(number * height, planes)
+        band(first, planes)
     })
 }
 
