@@ -25,7 +25,10 @@ class _Version(argparse.Action):
     """Print what is installed, found out only when asked, and stop."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        print(_about.about())
+        try:
+            print(_about.about())
+        except ValueError as error:
+            parser.exit(_FAILED, f"unsmear: {error}\n")
         parser.exit(0)
 
 
