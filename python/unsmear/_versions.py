@@ -1,7 +1,8 @@
 """What a result depends on beside its frames and parameters.
 
-The same version, built by another compiler or run on other vector instructions, may
-differ in the last bits of a floating point number; an iteration may carry them farther.
+The kernels give the same bits whatever the processor. NumPy's functions and the Fourier
+transforms choose their algorithm by its vector instructions and agree to rounding, the
+mathematical library comes with the compiler; an iteration may carry a last bit farther.
 On one machine, and for any number of threads, the bytes are the same.
 """
 

@@ -1,4 +1,5 @@
-//! What built this module and what its loops run on: enough to tell why two installations differ in the last bits.
+//! What built this module and what its loops run on: enough to tell why two installations differ in speed or, by way of
+//! Fourier transforms and mathematical libraries, in a last bit.
 
 use multiversion::multiversion;
 use multiversion::target::match_target;
