@@ -6,7 +6,8 @@ Blurs pictures that ship inside scikit-image by the motions of
 ``unsmear.synthetic.blur_cases`` (8 bit, several noise levels and seeds), removes the
 blur with the true velocity at mid-exposure, and writes ``deblur_table.md`` and
 ``.json``. A figure is the gain in PSNR over the blurred picture, dB, with a border of
-24 px left out. Our methods are those ``unsmear.deblur`` knows, with their defaults, and
+24 px left out. Runs of some pictures, seeds or methods are joined by `join_reports`.
+Our methods are those ``unsmear.deblur`` knows, with their defaults, and
 are told neither noise nor anything else; rivals (`deblur_rivals`) pick their settings
 by the truth.
 """
@@ -27,6 +28,7 @@ from typing import Any
 import numpy as np
 import unsmear
 from deblur_rivals import RIVALS, SETTINGS, SLOW, Problem, path_problem_matrix
+from deblur_table_page import BORDER, markdown
 from numpy.typing import NDArray
 from skimage import color, data
 from speed import processor
@@ -43,12 +45,9 @@ PICTURES = ("astronaut", "camera", "coffee", "chelsea")
 BEHIND = "camera"  # of the two layers; for itself the first picture
 NOISES = (0.0, 1.0, 5.0)  # grey levels
 SEEDS = (1, 2)
-SLOW_PICTURES = 2  # how many of the first pictures slow methods get, with one seed
+SLOW_PICTURES = PICTURES[:2]  # what slow methods get, with one seed
 SIZE, QUICK_SIZE = 240, 144  # px
 QUICK_CASES = ("T7", "R12", "SHa", "2L")
-BORDER = 24  # px
-# What the mean of the table is over: motions a correct model explains in full.
-IN_THE_MEAN = ("T7", "T11", "T22", "Z", "R5", "R12", "SH")
 INNER = np.s_[BORDER:-BORDER, BORDER:-BORDER]
 
 
@@ -87,10 +86,13 @@ def blurred_cases(
     """Yield each motion of each picture, with what makes the motion's matrix."""
     for case_name in names:
         matrix = None
-        for n, picture in enumerate(pictures):
+        for picture in pictures:
+            # By the picture's own place, so that a slice of the pictures gives the
+            # same cases as all of them.
+            n = PICTURES.index(picture) if picture in PICTURES else len(PICTURES)
             options: dict[str, Any] = {"direction": 30 + 97 * n}
             if case_name == "2L":
-                other = BEHIND if picture != BEHIND else pictures[n - 1]
+                other = BEHIND if picture != BEHIND else PICTURES[0]
                 options["behind"] = grey(other)
             case = synthetic.blur_case(
                 case_name, grey(picture), shape=(size, size), noise=0.0, **options
@@ -160,11 +162,10 @@ def contenders(
 ) -> dict[str, Callable[[], NDArray[Any]]]:
     """Return who runs on this picture."""
     runs: dict[str, Callable[[], NDArray[Any]]] = {
-        method: lambda m=method: ours(m)(case) for method in METHODS
+        method: lambda m=method: ours(m)(case) for method in given.methods
     }
     runs |= {name: lambda n=name: RIVALS[n](problem) for name in given.rivals}
-    slow_too = about["picture"] in given.pictures[:SLOW_PICTURES]
-    slow_too &= about["seed"] == given.seeds[0]
+    slow_too = about["picture"] in SLOW_PICTURES and about["seed"] == SEEDS[0]
     return {name: run for name, run in runs.items() if slow_too or name not in SLOW}
 
 
@@ -178,74 +179,6 @@ def summary(records: list[dict[str, Any]], case: str, picture: str) -> dict[str,
     }
 
 
-def markdown(report: dict[str, Any]) -> str:
-    """Return the tables: one per noise, the worst single results, and the times."""
-    records = report["records"]
-    methods = list(dict.fromkeys(r["method"] for r in records))
-    cases = list(dict.fromkeys(r["case"] for r in records))
-    lines = [
-        "# Deblurring known motion",
-        "",
-        f"{report['date']}, {report['processor']}, one thread. Gain in PSNR (dB) over "
-        f"the blurred picture / SSIM; means over {', '.join(report['pictures'])} "
-        f"({report['size']} x {report['size']} px of each) and {len(report['seeds'])} "
-        f"noise seeds; border of {BORDER} px left out. True velocity at mid-exposure; "
-        "noise not told. "
-        + (
-            "True acceleration where a method takes one. "
-            if KNOWS_ACCELERATION
-            else "No acceleration. "
-        )
-        + "Rivals choose their settings by the truth, and those with one kernel get "
-        f"the mean one; {' and '.join(SLOW)} ran on the first "
-        f"{SLOW_PICTURES} pictures with one seed. Made by "
-        "`benches/deblur_table.py`.",
-        "",
-    ]
-    lines += [f"- {case}: {synthetic.BLUR_CASES[case]}" for case in cases]
-    head = "| case | blurred | " + " | ".join(methods) + " |"
-    rule = "|---" * (len(methods) + 2) + "|"
-    for noise in report["noises"]:
-        lines += ["", f"## Noise of {noise:g} grey levels", "", head, rule]
-        for case in cases:
-            own = [r for r in records if (r["case"], r["noise"]) == (case, noise)]
-            lines.append(row(case, own, methods))
-        own = [r for r in records if r["case"] in IN_THE_MEAN and r["noise"] == noise]
-        counted = [case for case in cases if case in IN_THE_MEAN]
-        lines.append(row("mean of " + " ".join(counted), own, methods))
-        all_cases = [r for r in records if r["noise"] == noise]
-        worst = [
-            f"{min(r['gain'] for r in all_cases if r['method'] == m):+.1f}"
-            for m in methods
-        ]
-        lines.append("| worst single result | | " + " | ".join(worst) + " |")
-    times = [
-        f"{np.mean([r['seconds'] for r in records if r['method'] == m]):.2f}"
-        for m in methods
-    ]
-    lines += ["", "Mean processor seconds of one setting:", ""]
-    lines += [head.replace("| case | blurred", "| | "), rule]
-    lines.append("| seconds | | " + " | ".join(times) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def row(name: str, own: list[dict[str, Any]], methods: list[str]) -> str:
-    """Return one line of a table."""
-    if not own:
-        return f"| {name} |" + " |" * (len(methods) + 1)
-    before = [
-        np.mean([r["before"][k] for r in own if r["method"] == methods[0]])
-        for k in ("psnr", "ssim")
-    ]
-    cells = [f"{before[0]:.1f}/{before[1]:.2f}"]
-    for m in methods:
-        gain, ssim = (
-            np.mean([r[k] for r in own if r["method"] == m]) for k in ("gain", "ssim")
-        )
-        cells.append(f"{gain:+.1f}/{ssim:.2f}")
-    return f"| {name} | " + " | ".join(cells) + " |"
-
-
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -255,6 +188,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--cases", nargs="+", default=list(synthetic.BLUR_CASES))
     parser.add_argument("--noises", nargs="+", type=float, default=list(NOISES))
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS))
+    parser.add_argument("--methods", nargs="*", default=list(METHODS))
     parser.add_argument("--rivals", nargs="*", default=list(RIVALS))
     parser.add_argument("--size", type=int, default=SIZE)
     given = parser.parse_args()

@@ -4,7 +4,8 @@
 
 Synthetic clips: photographs of scikit-image under every kind of motion, exposures 1 and
 0.5, noise of one grey level, 8 bits, 5 frames; the middle frame counts, without a
-border of 24 px. Recorded clips, if DIR has them (barron/, slowmotion/avg_blur/,
+border of 24 px. Runs of some motions or pictures are joined by `join_reports`.
+Recorded clips, if DIR has them (barron/, slowmotion/avg_blur/,
 slowmotion/blur_video/): the mean over the frames that have a truth. Writes
 docs/deblur_video.md and .json.
 """
@@ -170,58 +171,77 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, help="folder of recorded clips")
     parser.add_argument("--joint", type=int, choices=(1, 3), default=1)
-    parser.add_argument("--pictures", nargs="+", default=["camera", "astronaut"])
+    parser.add_argument("--pictures", nargs="*", default=["camera", "astronaut"])
     parser.add_argument("--motions", nargs="+", default=MOTIONS, choices=MOTIONS)
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "deblur_video")
+    parser.add_argument("--exposures", nargs="+", type=float, default=EXPOSURES)
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    parser.add_argument("--threads", type=int, help="default: all processors")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
+    if options.threads:
+        unsmear.set_num_threads(options.threads)
     rows: list[dict[str, Any]] = []
     cases = itertools.product(
-        options.motions, EXPOSURES, options.pictures, range(options.seeds)
+        options.motions, options.exposures, options.pictures, options.seeds
     )
     for motion, exposure, name, seed in cases:
         made = clip(motion, name, exposure, seed)
         title = f"{motion}, exposure {exposure}, {name}, seed {seed}"
-        rows.append(row(title, made.blurred, made.sharp, [2], [2], options.joint))
-        mean = float(np.mean([line["gain"] for line in rows]))
+        line = row(title, made.blurred, made.sharp, [2], [2], options.joint)
+        rows.append(line | {"source": f"{name}, seed {seed}"})
         # What there is so far: a long run may be cut short.
-        write(options.output, rows, mean, options.joint)
+        write(options.output, rows, options.joint)
     if options.data:
-        write(
-            options.output,
-            rows + recorded(options.data, options.joint),
-            mean,
-            options.joint,
-        )
+        rows += recorded(options.data, options.joint)
+        write(options.output, rows, options.joint)
 
 
-def write(path: Path, rows: list[dict[str, Any]], mean: float, joint: int) -> None:
+def markdown(report: dict[str, Any]) -> str:
+    """Return the table, after what the synthetic clips come to."""
+    rows = report["records"]
+    names = [name for name in rows[0] if name != "source"]
+    made: dict[str, list[float]] = {}
+    for line in rows:
+        if "source" in line:
+            made.setdefault(line["source"], []).append(line["gain"])
+    lines = [
+        "# Blurred clips restored without any parameter",
+        "",
+        "Gains in dB over the blurred frames; frames restored together: "
+        f"{report['joint']}. Version {report['version']}, {report['date']}, "
+        f"{report['machine']}. Made by `benches/deblur_video.py`.",
+        "",
+    ]
+    if made:
+        every = [gain for gains in made.values() for gain in gains]
+        lines += [
+            "| synthetic clips | number | mean gain | worst |",
+            "|---|---|---|---|",
+        ]
+        for source, gains in (made | {"all": every}).items():
+            mean, worst = np.mean(gains), min(gains)
+            lines.append(f"| {source} | {len(gains)} | {mean:+.2f} | {worst:+.2f} |")
+        lines.append("")
+    lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    for line in sorted(rows, key=lambda line: "source" not in line):
+        lines.append("| " + " | ".join(str(line[name]) for name in names) + " |")
+    return "\n".join([*lines, ""])
+
+
+def write(folder: Path, rows: list[dict[str, Any]], joint: int) -> None:
     """Write the rows as markdown and JSON."""
-    about = {
+    report = {
         "date": dt.datetime.now(tz=dt.UTC).date().isoformat(),
         "machine": f"{platform.machine()}, {platform.python_implementation()} "
         f"{platform.python_version()}, {unsmear.get_num_threads()} threads",
         "version": unsmear.__version__,
         "joint": joint,
-        "synthetic_mean_gain": round(mean, 2),
+        "records": rows,
     }
-    names = list(rows[0])
-    lines = [
-        "# Blurred clips restored without any parameter",
-        "",
-        f"Gains in dB over the blurred frames; frames restored together: {joint}; mean "
-        f"of the synthetic clips {mean:+.2f} dB. Version {about['version']}, "
-        f"{about['date']}, {about['machine']}. Made by `benches/deblur_video.py`.",
-        "",
-        "| " + " | ".join(names) + " |",
-        "|" + "---|" * len(names),
-        *("| " + " | ".join(str(line[name]) for name in names) + " |" for line in rows),
-        "",
-    ]
-    path.parent.mkdir(exist_ok=True)
-    path.with_suffix(".md").write_text("\n".join(lines), encoding="utf-8")
-    path.with_suffix(".json").write_text(
-        json.dumps({"about": about, "rows": rows}, indent=2) + "\n", encoding="utf-8"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "deblur_video.md").write_text(markdown(report), encoding="utf-8")
+    (folder / "deblur_video.json").write_text(
+        json.dumps(report, indent=2) + "\n", encoding="utf-8"
     )
 
 

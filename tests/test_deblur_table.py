@@ -102,3 +102,68 @@ def test_wrong_velocities_are_told_apart(
     (record,) = json.loads((tmp_path / "deblur_mismatch.json").read_text())["records"]
     assert record["gains"]["true"] > 3 + record["gains"]["x 1.5"]
     assert "| all |" in (tmp_path / "deblur_mismatch.md").read_text()
+
+
+def record(picture: str, method: str, gain: float, seed: int = 1) -> dict:
+    about = {"case": "T7", "picture": picture, "noise": 1.0, "seed": seed}
+    values = {"gain": gain, "ssim": 0.9, "seconds": 0.1}
+    return about | {"method": method, "before": {"psnr": 25.0, "ssim": 0.8}} | values
+
+
+def table(*records: dict) -> dict:
+    about = {"date": "2026-01-01", "processor": "one", "version": "1", "size": 96}
+    kinds = {"pictures": "picture", "noises": "noise", "seeds": "seed"}
+    lists = {k: list({r[key] for r in records}) for k, key in kinds.items()}
+    return about | lists | {"records": list(records)}
+
+
+def test_slices_of_a_bench_are_joined(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(BENCHES)
+    import join_reports
+
+    slices = [
+        table(record("camera", "tv", 9.0), record("camera", "sk RL", 4.0)),
+        table(record("coffee", "tv", 1.0)),
+        # Measured again: it takes the place of the first.
+        table(record("camera", "tv", 8.5)),
+    ]
+    for n, part in enumerate(slices):
+        (tmp_path / str(n)).mkdir()
+        (tmp_path / str(n) / "deblur_table.json").write_text(json.dumps(part))
+    folders = [str(tmp_path / str(n)) for n in range(len(slices))]
+    arguments = ["join_reports", "deblur_table", *folders, "--output", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    assert join_reports.main() == 0
+    report = json.loads((tmp_path / "deblur_table.json").read_text())
+    assert report["pictures"] == ["camera", "coffee"]
+    assert [r["gain"] for r in report["records"]] == [8.5, 4.0, 1.0]
+    page = (tmp_path / "deblur_table.md").read_text()
+    # The mean of both pictures; the lead on the one that both have restored.
+    assert "| T7 | 25.0/0.80 | +4.8/0.90 | +4.0/0.90 |" in page
+    assert "| T7 | +4.5 (sk RL) |" in page
+    assert "Only part of it ran with sk RL: camera; seed 1" in page
+
+
+def test_slices_of_other_versions_are_not_joined(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(BENCHES)
+    import join_reports
+
+    old = table(record("camera", "tv", 9.0)) | {"version": "0"}
+    with pytest.raises(ValueError, match="differ in version"):
+        join_reports.joined([old, table(record("coffee", "tv", 1.0))])
+
+
+def test_a_slice_of_the_pictures_blurs_them_as_all_of_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(BENCHES)
+    import deblur_table
+
+    # Two layers: both the direction and the picture behind depend on the picture.
+    every = list(deblur_table.blurred_cases(["2L"], ["astronaut", "camera"], 64))
+    alone = list(deblur_table.blurred_cases(["2L"], ["camera"], 64))
+    np.testing.assert_array_equal(every[1][2].blurred, alone[0][2].blurred)

@@ -15,6 +15,8 @@
 
 use std::f64::consts::TAU;
 
+use multiversion::multiversion;
+
 use crate::fourier::{Complex64, LinePlan};
 
 /// Samples of the path.
@@ -35,22 +37,25 @@ const MOST_A: f64 = 190.0;
 /// Greatest b in the table, rad: a speed that changes by 24 px during the exposure at the highest frequency used.
 const MOST_B: f64 = 64.0;
 
+/// Waves worked on together.
+const LANES: usize = 16;
+
 /// |K|^2 over (b, a); see the [module](self).
 pub(super) struct PathSpectrum {
     columns: usize,
     rows: usize,
-    values: Vec<f32>,
+    /// Of each cell of the table, `[z, d_a, d_b, d_ab]` of `z + f_a d_a + f_b (d_b + f_a d_ab)`, `f` in 0..1 across it.
+    cells: Vec<[f32; 4]>,
 }
 
 impl PathSpectrum {
     /// The table for |b| up to `most_b` (rad), or as far as it goes.
     pub(super) fn new(most_b: f64) -> Self {
-        let columns = (MOST_A / STEP_A) as usize + 2;
-        let rows = (most_b.clamp(0.0, MOST_B) / STEP_B).ceil() as usize + 2;
+        let columns = (MOST_A / STEP_A) as usize + 1;
+        let rows = (most_b.clamp(0.0, MOST_B) / STEP_B).ceil() as usize + 1;
         let plan = LinePlan::new(LENGTH);
         let (mut line, mut scratch) = (Vec::new(), Vec::new());
-        let mut values = Vec::with_capacity(rows * columns);
-        for row in 0..rows {
+        let mut corners = |row: usize| -> Vec<f32> {
             let b = row as f64 * STEP_B;
             line.clear();
             line.extend((0..SAMPLES).map(|m| {
@@ -59,13 +64,24 @@ impl PathSpectrum {
             }));
             line.resize(LENGTH, Complex64::default());
             plan.forward(&mut line, &mut scratch);
-            values.extend(line[..columns].iter().enumerate().map(|(k, value)| {
+            let corner = |(k, value): (usize, &Complex64)| {
                 let half = k as f64 * STEP_A / (2.0 * SAMPLES as f64);
                 let droop = if k == 0 { 1.0 } else { half.sin() / half };
                 (value.norm_sqr() * droop * droop) as f32
+            };
+            line[..=columns].iter().enumerate().map(corner).collect()
+        };
+        let mut cells = Vec::with_capacity(rows * columns);
+        let mut low = corners(0);
+        for row in 0..rows {
+            let high = corners(row + 1);
+            cells.extend(low.windows(2).zip(high.windows(2)).map(|(low, high)| {
+                let [along_low, along_high] = [low[1] - low[0], high[1] - high[0]];
+                [low[0], along_low, high[0] - low[0], along_high - along_low]
             }));
+            low = high;
         }
-        Self { columns, rows, values }
+        Self { columns, rows, cells }
     }
 
     /// Adds `weight own |K|^2(a, b)` for the waves (x, y, own weight) shifted by `shift`, blurred along `velocity` and
@@ -73,32 +89,87 @@ impl PathSpectrum {
     pub(super) fn add(
         &self,
         weight: f32,
-        [wx, wy, own]: [&[f32]; 3],
+        waves: [&[f32]; 3],
         shift: [f32; 2],
         velocity: [f32; 2],
         curvature: [f32; 2],
         out: &mut [f32],
     ) {
-        let per_a = (1.0 / STEP_A) as f32;
-        let per_b = (1.0 / STEP_B) as f32;
-        let last = (self.columns - 2) as f32;
-        let last_row = (self.rows - 2) as f32;
-        for (((sum, &x), &y), &own) in out.iter_mut().zip(wx).zip(wy).zip(own) {
-            let weight = weight * own;
-            let (x, y) = (x + shift[0], y + shift[1]);
+        let motion = Motion { shift, velocity, curvature, weight };
+        let (whole, rest) = out.as_chunks_mut::<LANES>();
+        let [(x, rest_x), (y, rest_y), (own, rest_own)] = waves.map(<[f32]>::as_chunks::<LANES>);
+        add_blocks(&self.cells, [self.columns, self.rows], &motion, [x, y, own], whole);
+        let [x, y, own] = [rest_x, rest_y, rest_own].map(filled_up);
+        let mut sums = [filled_up(rest)];
+        add_blocks(
+            &self.cells,
+            [self.columns, self.rows],
+            &motion,
+            [&[x], &[y], &[own]],
+            &mut sums,
+        );
+        rest.copy_from_slice(&sums[0][..rest.len()]);
+    }
+}
+
+/// What a wave passes through, and how much of it counts.
+struct Motion {
+    shift: [f32; 2],
+    velocity: [f32; 2],
+    curvature: [f32; 2],
+    weight: f32,
+}
+
+/// Samples and zeros after them.
+fn filled_up(samples: &[f32]) -> [f32; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes[..samples.len()].copy_from_slice(samples);
+    lanes
+}
+
+/// Blocks of waves: where each is read, what stands there, what lies between.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_blocks(
+    table: &[[f32; 4]],
+    [columns, rows]: [usize; 2],
+    motion: &Motion,
+    [x, y, own]: [&[[f32; LANES]]; 3],
+    out: &mut [[f32; LANES]],
+) {
+    let &Motion { shift, velocity, curvature, weight } = motion;
+    let (per_a, per_b) = ((1.0 / STEP_A) as f32, (1.0 / STEP_B) as f32);
+    let (last_a, last_b) = ((columns - 1) as f32, (rows - 1) as f32);
+    let mut place = [0u32; LANES];
+    let [mut along_a, mut along_b, mut share, mut beyond] = [[0.0f32; LANES]; 4];
+    let mut cells = [[0.0f32; LANES]; 4];
+    for (((sums, x), y), own) in out.iter_mut().zip(x).zip(y).zip(own) {
+        for lane in 0..LANES {
+            let (x, y) = (x[lane] + shift[0], y[lane] + shift[1]);
             let a = (x * velocity[0] + y * velocity[1]).abs() * per_a;
-            let b = ((x * curvature[0] + y * curvature[1]).abs() * per_b).min(last_row + 1.0);
-            if a > last {
-                let a = a * STEP_A as f32;
-                *sum += weight * 2.0 / (a * a);
-                continue;
+            let b = (x * curvature[0] + y * curvature[1]).abs() * per_b;
+            let b = if b > last_b + 1.0 { last_b + 1.0 } else { b };
+            let within = a <= last_a;
+            let near = if within { a } else { 0.0 };
+            let row = if b > last_b { last_b } else { b } as i32;
+            let column = near as i32;
+            place[lane] = (row * columns as i32 + column) as u32;
+            along_a[lane] = near - column as f32;
+            along_b[lane] = b - row as f32;
+            let weight = weight * own[lane];
+            let far = a * STEP_A as f32;
+            share[lane] = if within { weight } else { 0.0 };
+            beyond[lane] = if within { 0.0 } else { weight * 2.0 / (far * far) };
+        }
+        for lane in 0..LANES {
+            let cell = table[place[lane] as usize];
+            for part in 0..4 {
+                cells[part][lane] = cell[part];
             }
-            let (column, row) = (a.min(last) as usize, b.min(last_row) as usize);
-            let (fa, fb) = (a - column as f32, b - row as f32);
-            let low = &self.values[row * self.columns + column..][..2];
-            let high = &self.values[(row + 1) * self.columns + column..][..2];
-            let (low, high) = (low[0] + fa * (low[1] - low[0]), high[0] + fa * (high[1] - high[0]));
-            *sum += weight * (low + fb * (high - low));
+        }
+        for lane in 0..LANES {
+            let low = cells[0][lane] + along_a[lane] * cells[1][lane];
+            let rise = cells[2][lane] + along_a[lane] * cells[3][lane];
+            sums[lane] += share[lane] * (low + along_b[lane] * rise) + beyond[lane];
         }
     }
 }

@@ -34,8 +34,8 @@ pub use system::{SorSystem, SystemRows};
 /// Half-sweeps per pass: 11 rows of 640 px are 260 kB, well inside a second-level cache.
 const HALVES_PER_PASS: usize = 10;
 
-/// Fewest pixels worth a thread of their own: a pass over them takes some 40 us, ten times its scheduling.
-const PIXELS_PER_BAND: usize = 16384;
+/// Fewest pixels worth a thread of their own: a pass over them takes some 10 us, several times its scheduling.
+const PIXELS_PER_BAND: usize = 4096;
 
 /// Memory of [`solve`], 36 B/px; reusable between calls of any size.
 #[derive(Debug, Default)]
