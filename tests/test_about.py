@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import unsmear
+from unsmear import _unsmear
 from unsmear.cli import _about, main
 
 
@@ -24,8 +26,34 @@ def test_version_says_what_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert first == f"unsmear {unsmear.__version__}"
     named = dict(line.split(maxsplit=1) for line in rest)
     assert named["threads"] == str(unsmear.get_num_threads())
-    assert named["core"] == "optimised"
+    assert named["core"].startswith("optimised, ")
+    assert re.search(r"rustc \d+\.\d+\.\d+", named["core"])
+    assert re.search(r"\w+-\w+-\w+ with ", named["core"]), "the target"
     assert {"commit", "vectors", "python", "numpy", "machine"} <= set(named)
+
+
+def test_the_vectors_are_the_processor_s() -> None:
+    vectors = dict(_unsmear.build_info())["vectors"]
+    assert vectors in {"avx512", "avx2", "baseline"}
+    listed = Path("/proc/cpuinfo")
+    if platform.machine() != "x86_64" or not listed.exists():
+        pytest.skip("the system names no x86-64 extensions")
+    has = set(listed.read_text().split())
+    widest = {"avx512f", "avx512bw", "avx512dq", "avx512vl"}
+    expected = "avx512" if widest <= has else "avx2" if "avx2" in has else "baseline"
+    assert vectors == expected
+
+
+def test_a_setting_that_cannot_be_is_named() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "unsmear", "--version"],
+        env=os.environ | {"UNSMEAR_NUM_THREADS": "many"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("unsmear: UNSMEAR_NUM_THREADS must be")
 
 
 class Recorded:

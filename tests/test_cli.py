@@ -71,6 +71,23 @@ def test_flow_then_evaluate_then_show(clip: Path, capsys) -> None:
     )
 
 
+def test_tables_are_for_machines(clip: Path, capsys) -> None:
+    command = ["flow", str(clip / "clip"), "-o", str(clip / "a.flo"), "--method=fast"]
+    assert main(command) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("density ") for line in told)
+    assert max(map(len, told)) < 88 + len(str(clip)), "no line is a table"
+    assert main([*command, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["levels"], "nothing is lost"
+
+
+def test_a_missing_file_is_named_in_words(tmp_path: Path, capsys) -> None:
+    missing = str(tmp_path / "clip.mp4")
+    assert main(["deblur", missing, "-o", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().err
+    assert said == f"unsmear: {missing}: No such file or directory\n"
+
+
 def test_evaluate_counts_what_is_asked_for(clip: Path, capsys) -> None:
     truth = unsmear.read_flow(clip / "truth.flo")
     truth[:10] = 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import unsmear
@@ -124,3 +126,63 @@ def test_arrays_of_other_libraries_pass(flow: np.ndarray) -> None:
 
 def test_integers_are_pixels() -> None:
     assert convert.from_skimage(np.full((2, 1, 1), 3)).ravel().tolist() == [3.0, 3.0]
+
+
+def test_flow_of_xarray_is_labelled_like_its_frames(flow: np.ndarray) -> None:
+    xarray = pytest.importorskip("xarray")
+    rows, columns = np.arange(5) * 0.5, np.arange(7) + 100
+    frames = xarray.DataArray(
+        np.zeros((7, 2, 5)),
+        dims=("x", "t", "y"),
+        coords={"x": columns, "y": rows, "t": [3, 4]},
+    )
+    one = convert.to_xarray(flow, like=frames)
+    assert one.dims == ("y", "x", "component") and one.attrs["units"] == "px/frame"
+    v = one.sel(y=0.5, x=102, component="v")  # NaN: unknown
+    assert np.isnan(v) and one.sel(y=1.0, x=106, component="u") == flow[2, 6, 0]
+    several = convert.to_xarray(np.stack([flow, 2 * flow]), like=frames)
+    assert several.dims == ("t", "y", "x", "component")
+    np.testing.assert_array_equal(several.sel(t=4), 2 * flow)
+    assert bits(convert.from_xarray(several.transpose(..., "t"))[0]) == bits(flow)
+    assert bits(convert.from_xarray(convert.to_xarray(flow))) == bits(flow)
+    one[:] = 0
+    assert flow[0].any(), "a copy"
+    with pytest.raises(ValueError, match="like must have 5 along y, got 6"):
+        convert.to_xarray(
+            flow, like=xarray.DataArray(np.zeros((6, 7)), dims=("y", "x"))
+        )
+    with pytest.raises(ValueError, match=r"flow must have shape \(H, W, 2\) or"):
+        convert.to_xarray(flow[..., :1])
+
+
+def test_axes_of_xarray_come_in_any_order(rng: np.random.Generator) -> None:
+    xarray = pytest.importorskip("xarray")
+    frames = rng.integers(0, 255, (4, 5, 7, 3)).astype(np.uint8)
+    named = xarray.DataArray(frames, dims=("t", "y", "x", "c"))
+    assert np.shares_memory(convert.from_xarray(named), frames)
+    turned = convert.from_xarray(named.transpose("c", "x", "t", "y"))
+    np.testing.assert_array_equal(turned, frames)
+    assert turned.dtype == np.uint8
+    for wrong in (named.rename(t="time"), named[:, 0]):
+        with pytest.raises(ValueError, match="array must have axes named y, x and at"):
+            convert.from_xarray(wrong)
+    with pytest.raises(TypeError, match=r"must be an xarray\.DataArray, got ndarray"):
+        convert.from_xarray(frames)
+
+
+def test_frames_of_xarray_pass_as_they_are() -> None:
+    xarray = pytest.importorskip("xarray")
+    make = unsmear.synthetic
+    frames = make.translation(make.texture((64, 64)), (1, 0), shape=(40, 40)).sharp
+    named = xarray.DataArray(frames, dims=("t", "y", "x"))
+    np.testing.assert_array_equal(
+        unsmear.optical_flow(named).flow, unsmear.optical_flow(frames).flow
+    )
+
+
+def test_without_xarray_the_message_says_what_to_install(
+    flow: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError, match="pip install xarray"):
+        convert.to_xarray(flow)

@@ -40,8 +40,8 @@ class FakeChain:
     def unsteadiness(self, _index: int) -> float:
         return self.unsteady
 
-    def forget_before(self, index: int) -> None:
-        self.forgotten.append(index)
+    def forget_before(self, index: int, guided: int = 0) -> None:
+        self.forgotten.append((index, guided))
 
 
 @pytest.fixture
@@ -112,7 +112,10 @@ def _used_from_second(self: FakeChain, index: int) -> Restored:
     )
 
 
-def test_each_pass_keeps_what_those_after_it_look_back_on(chains: Any) -> None:
+def test_each_pass_keeps_results_that_those_after_it_look_back_on(
+    chains: Any,
+) -> None:
     passes().forget_before(20)
     # 5 frames back for every pass to come.
-    assert [chain.forgotten for chain in chains.made] == [[10], [15], [20]]
+    kept = [[(20, 10)], [(20, 5)], [(20, 0)]]
+    assert [chain.forgotten for chain in chains.made] == kept

@@ -11,6 +11,7 @@ from unsmear import blur, component_velocity, deblur, demo_clip, flow  # noqa: F
 ROOT = Path(__file__).parent.parent
 MODULES = (
     "blur",
+    "convert",
     "deblur",
     "demo_clip",
     "exposure",

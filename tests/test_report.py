@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import unsmear
 from PIL import Image
 from unsmear import metrics, plot
 
@@ -95,7 +96,10 @@ def test_the_page_is_self_contained(tmp_path, clip):
     assert "@import" not in html and "fetch(" not in html
     page = data_of(path)
     assert page["title"] == hostile
-    assert page["parameters"]["a"] is None and "unsmear" in page["parameters"]
+    parameters = page["parameters"]
+    assert parameters["a"] is None and parameters["b"] == [1]
+    assert parameters["versions"]["unsmear"] == unsmear.__version__
+    assert {"core", "vectors", "python", "numpy"} <= set(parameters["versions"])
 
 
 def test_long_clips_are_thinned(tmp_path):

@@ -121,6 +121,25 @@ def test_memory_does_not_grow_with_the_clip() -> None:
     assert len(memo) <= 5
 
 
+def test_memory_spares_what_guides_the_next_pass() -> None:
+    memo = Memo()
+    for index in range(10):
+        for kind in ("value", "restored"):
+            memo.get(kind, index, object)
+    memo.forget_before(8, "restored", 5)
+    made: list[tuple[str, int]] = []
+    for kind in ("value", "restored"):
+        for index in range(10):
+            memo.get(kind, index, lambda key=(kind, index): made.append(key))
+    assert made == [("value", k) for k in range(8)] + [
+        ("restored", k) for k in range(5)
+    ]
+    # Less is spared than is kept anyway: nothing more is dropped.
+    memo.forget_before(3, "restored", 7)
+    memo.get("restored", 3, lambda: made.append(("again", 3)))
+    assert ("again", 3) not in made
+
+
 def test_bad_input_is_named(pan: synthetic.Sequence) -> None:
     frames = pan.blurred
     for options, words in [

@@ -17,7 +17,7 @@ from unsmear import synthetic
 from unsmear.velocity import velocity_of_frame
 
 COUNT = 7
-SHAPE = (49, 63)
+SHAPE = (41, 51)
 FLOW = np.full((*SHAPE, 2), (4, 2), np.float32)
 QUICK: dict[str, Any] = {"method": "wiener", "exposure": 0.8, "noise": 1.0}
 GIVEN: dict[str, Any] = QUICK | {"flow": FLOW}

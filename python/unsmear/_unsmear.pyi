@@ -21,6 +21,7 @@ __all__ = [
     "__version__",
     "blur_f32",
     "blur_f64",
+    "build_info",
     "coarse_to_fine",
     "component_velocities",
     "correlate_separable",
@@ -277,5 +278,6 @@ def ssim(a: _Double, b: _Double, data_range: float) -> float: ...
 
 # Threads.
 
+def build_info() -> list[tuple[str, str]]: ...
 def set_num_threads(n: int) -> None: ...
 def get_num_threads() -> int: ...

@@ -19,22 +19,34 @@ exact, bit for bit, NaN included.
 
 Pictures differ too: scikit-image has R, G, B on the last axis, as here; OpenCV reads
 and writes B, G, R, so ``picture[..., ::-1]`` goes either way.
+
+Labelled arrays of xarray pass as they are wherever arrays do, taken in the order of
+their axes; `from_xarray` puts named axes in order, `to_xarray` names those of a flow.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from unsmear._arrays import as_flow, as_real_array
 
 if TYPE_CHECKING:
+    import xarray
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["from_opencv", "from_skimage", "to_opencv", "to_skimage"]
+__all__ = [
+    "from_opencv",
+    "from_skimage",
+    "from_xarray",
+    "to_opencv",
+    "to_skimage",
+    "to_xarray",
+]
 
+_AXES = {"t": 0, "y": 1, "x": 2, "c": 3, "component": 3}  # name: place
 _OPENCV_UNKNOWN = 1e9  # its reader and writer of .flo take larger values for unknown
 
 
@@ -150,3 +162,102 @@ def from_opencv(flow: ArrayLike) -> NDArray[np.float32]:
     field = np.array(as_flow(flow), order="C", copy=True)
     field[(np.abs(field) > _OPENCV_UNKNOWN).any(axis=-1)] = np.nan
     return field
+
+
+def to_xarray(flow: ArrayLike, like: xarray.DataArray | None = None) -> Any:
+    """Return the flow as a labelled array of xarray.
+
+    Parameters
+    ----------
+    flow : array_like of shape (H, W, 2) or (T, H, W, 2)
+        (u, v), px/frame; NaN = unknown. Several fields as in
+        ``deblur_sequence(frames).flows``.
+    like : xarray.DataArray, optional
+        The frames the flow was measured on, axes named as in `from_xarray`: what
+        labels their axes t (of as many fields), y and x labels those of the flow.
+
+    Returns
+    -------
+    xarray.DataArray
+        Axes ([t,] y, x, component), float32, a copy; ``component`` is labelled "u" (to
+        the right) and "v" (down), the attribute ``units`` is "px/frame". Values stay
+        in px even where ``like`` labels pixels otherwise.
+
+    Raises
+    ------
+    ImportError
+        If xarray is not installed.
+    ValueError
+        If the shape is another, or ``like`` has other numbers of pixels.
+    TypeError
+        If the values are not real numbers.
+
+    Examples
+    --------
+    Restored frames get the labels of the given ones by xarray's own means::
+
+        frames = xarray.open_dataarray("clip.nc").transpose("t", "y", "x")
+        made = unsmear.deblur_sequence(frames)
+        restored = frames.copy(data=made.frames)
+        flows = unsmear.convert.to_xarray(made.flows, like=frames)
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        msg = "convert.to_xarray needs xarray: pip install xarray"
+        raise ImportError(msg) from error
+    field, _ = as_real_array(flow, "flow")
+    if field.ndim not in (3, 4) or field.shape[-1] != 2:
+        msg = f"flow must have shape (H, W, 2) or (T, H, W, 2), got {field.shape}"
+        raise ValueError(msg)
+    axes = ("t", "y", "x")[4 - field.ndim :]
+    labels: dict[str, Any] = {"component": ["u", "v"]}
+    for axis, size in zip(axes, field.shape, strict=False):
+        if like is None or axis not in like.dims:
+            continue
+        if like.sizes[axis] != size:
+            msg = f"like must have {size} along {axis}, got {like.sizes[axis]}"
+            raise ValueError(msg)
+        if axis in like.coords:
+            labels[axis] = like.coords[axis]
+    return xarray.DataArray(
+        np.array(field, np.float32),
+        dims=(*axes, "component"),
+        coords=labels,
+        name="flow",
+        attrs={"units": "px/frame"},
+    )
+
+
+def from_xarray(array: xarray.DataArray) -> NDArray[Any]:
+    """Return frames, a picture or a flow with axes in the order used here.
+
+    Parameters
+    ----------
+    array : xarray.DataArray
+        Axes named t (frames), y (rows), x (columns), c (channels) or component (of a
+        flow: "u", "v"), in any order; y and x must be there. Others are to be renamed:
+        ``array.rename(time="t")``.
+
+    Returns
+    -------
+    ndarray of shape ([T,] H, W[, C])
+        A view where the order is this already; samples are as they came.
+
+    Raises
+    ------
+    TypeError
+        If ``array`` has no named axes.
+    ValueError
+        If axes have other names, or y or x is missing.
+    """
+    names = getattr(array, "dims", None)
+    if names is None:
+        msg = f"array must be an xarray.DataArray, got {type(array).__name__}"
+        raise TypeError(msg)
+    places = [_AXES.get(name) for name in names]
+    if None in places or len({*places}) < len(places) or not {1, 2} <= {*places}:
+        expected = "y, x and at most t and one of c, component"
+        msg = f"array must have axes named {expected}, got {', '.join(map(str, names))}"
+        raise ValueError(msg)
+    return np.asarray(array.transpose(*sorted(names, key=_AXES.__getitem__)))

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 
 mod allocator;
 mod arrays;
+mod build_info;
 mod coarse_to_fine;
 mod component_velocity;
 mod convolve;
@@ -25,6 +26,8 @@ mod threads;
 /// Private core of `unsmear`; import the package instead.
 #[pymodule]
 mod _unsmear {
+    #[pymodule_export]
+    use crate::build_info::build_info;
     #[pymodule_export]
     use crate::coarse_to_fine::coarse_to_fine;
     #[pymodule_export]

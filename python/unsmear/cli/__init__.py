@@ -25,7 +25,10 @@ class _Version(argparse.Action):
     """Print what is installed, found out only when asked, and stop."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        print(_about.about())
+        try:
+            print(_about.about())
+        except ValueError as error:
+            parser.exit(_FAILED, f"unsmear: {error}\n")
         parser.exit(0)
 
 
@@ -76,9 +79,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return _FAILED
     except (ValueError, TypeError, OSError, ImportError, MemoryError) as error:
-        print(f"unsmear: {error or type(error).__name__}", file=sys.stderr)
+        print(f"unsmear: {_said(error)}", file=sys.stderr)
         return _FAILED
     return status or 0
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error) or type(error).__name__
 
 
 def entry() -> NoReturn:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import platform
 import shutil
 import subprocess
 from importlib import metadata
@@ -12,39 +11,22 @@ from typing import Any
 from urllib.parse import urlparse
 from urllib.request import url2pathname
 
-import numpy as np
-
-from unsmear import __version__, _unsmear, get_num_threads
+from unsmear import get_num_threads
+from unsmear._versions import versions
 
 _PATIENCE = 5  # seconds for git
 
 
 def about() -> str:
     """Return name and version on the first line, then what runs under what."""
-    commit = _commit()
+    known = versions()
+    first = f"unsmear {known.pop('unsmear')}"
     lines = {
-        "commit": commit or "unknown",
-        "core": "optimised" if _unsmear.optimized else "built without optimisation",
+        "commit": _commit() or "unknown",
+        **known,
         "threads": str(get_num_threads()),
-        "vectors": _vectors(),
-        "python": f"{platform.python_version()} ({platform.python_implementation()})",
-        "numpy": np.__version__,
-        "machine": f"{platform.machine()}, {platform.system()}",
     }
-    return "\n".join(
-        [f"unsmear {__version__}", *(f"{k:<8} {v}" for k, v in lines.items())]
-    )
-
-
-def _vectors() -> str:
-    """Return the processor's vector extensions as NumPy sees them.
-
-    The core chooses among AVX-512, AVX2 and SSE2 by the same processor's word.
-    """
-    found: dict[str, Any] = dict(np.show_config(mode="dicts") or {})
-    extensions = found.get("SIMD Extensions", {})
-    names = [*extensions.get("baseline", ()), *extensions.get("found", ())]
-    return " ".join(names) or "unknown"
+    return "\n".join([first, *(f"{k:<8} {v}" for k, v in lines.items())])
 
 
 def _commit() -> str | None:

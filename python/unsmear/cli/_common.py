@@ -54,7 +54,7 @@ def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def show_result(result: dict[str, Any], *, as_json: bool) -> None:
-    """Print a result: JSON, or one aligned line per entry."""
+    """Print a result: JSON, or one aligned line per entry but tables, for machines."""
     if as_json:
         print(json.dumps(plain_data(result), indent=2))
         return
@@ -69,7 +69,7 @@ def _flatten(result: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
     for name, value in result.items():
         if isinstance(value, dict):
             lines += _flatten(value, f"{prefix}{name} ")
-        else:
+        elif not (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
             lines.append((f"{prefix}{name}", value))
     return lines
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "remove the motion blur of every frame"
 MEMORY = """memory, whatever the number of frames of W x H pixels: about 110 MiB,
-33 frames as stored, and 1100 W H bytes ("auto"; as much again for each further
+33 frames as stored, and 1700 W H bytes ("auto"; up to as much again for each further
 exposure or pass tried, at most five) or 350 W H bytes ("wiener"); the report of
 every frame takes some kilobytes"""
 EXAMPLE = "unsmear deblur clip.mp4 -o sharp/ --report report.html"

@@ -23,11 +23,21 @@ if TYPE_CHECKING:
 SUMMARY = "compare a flow field with the truth, methods on sequences, or two pictures"
 EXAMPLE = """unsmear evaluate flow.flo truth.flo --mask land.png
   unsmear evaluate --suite sequences/ --methods balanced fast --rivals -o table"""
+_PRINTED = """
+
+printed for FLOW TRUTH:
+  aae          mean angle between (u, v, 1) of both, degrees
+  direction    mean angle between (u, v) of both, degrees
+  epe          mean endpoint error, px/frame; percentiles are of it
+  magnitude    mean difference in speed, px/frame
+  density      share of the pixels counted where the flow is known
+  outliers     share of them wrong by more than 3 px/frame and 5 % of the speed"""
 _SUITE_SUFFIXES = (".md", ".json")
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
     """Declare the options."""
+    verb.epilog = f"{verb.epilog or ''}{_PRINTED}"
     verb.add_argument("files", nargs="*", metavar="FILE", help="FLOW TRUTH")
     verb.add_argument("--mask", help="picture: pixels that count are not 0")
     verb.add_argument(

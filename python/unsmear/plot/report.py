@@ -22,7 +22,7 @@ import numpy as np
 from unsmear._atomic import write_bytes_atomic
 from unsmear._drawing import as_display
 from unsmear._plain_data import plain_data
-from unsmear._unsmear import __version__
+from unsmear._versions import versions
 from unsmear.images import encode_picture
 from unsmear.plot._report_errors import error_curves, error_tables
 from unsmear.plot.flow_pictures import flow_to_color, legend
@@ -81,7 +81,8 @@ def report(
     verdicts : sequence of str
         What was found, in plain words, one line each.
     parameters : mapping, optional
-        Whatever repeats the result: JSON-able plain data. The version is added.
+        Whatever repeats the result: JSON-able plain data. The versions of all that
+        computes are added, as ``versions``.
     command : str, optional
         The command line that repeats the result.
     title : str
@@ -129,7 +130,7 @@ def report(
         ],
         "tables": error_tables(names, before, after, truth, flow_list, true_list),
         "curves": error_curves(names, flow_list, confidence_list, true_list),
-        "parameters": {"unsmear": __version__, **(parameters or {})},
+        "parameters": {"versions": versions(), **(parameters or {})},
         "command": command,
     }
     write_bytes_atomic(path, _html(page).encode())

@@ -99,10 +99,14 @@ class Chain:
             settings.joint // 2,
         )
 
-    def forget_before(self, index: int) -> None:
-        """Drop what no frame from ``index`` on needs."""
-        self._memo.forget_before(index - KEPT_BEHIND)
-        self._several.forget_before(index - KEPT_BEHIND)
+    def forget_before(self, index: int, guided: int = 0) -> None:
+        """Drop what no frame from ``index`` on needs.
+
+        Results, which guide the next pass, stay for ``guided`` frames more.
+        """
+        first = index - KEPT_BEHIND
+        self._memo.forget_before(first, "restored", first - guided)
+        self._several.forget_before(first)
 
     def restored(self, index: int) -> Restored:
         """Return a frame restored by itself."""

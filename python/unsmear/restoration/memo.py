@@ -25,10 +25,16 @@ class Memo:
             self._values[key] = compute()
         return cast("Value", self._values[key])
 
-    def forget_before(self, index: int) -> None:
-        """Drop what belongs to frames before ``index``."""
-        for key in [key for key in self._values if key[1] < index]:
-            del self._values[key]
+    def forget_before(
+        self, index: int, spared: Hashable = None, spared_from: int = 0
+    ) -> None:
+        """Drop what belongs to frames before ``index``.
+
+        Values of the kind ``spared`` stay for frames from ``spared_from`` on.
+        """
+        for kind, frame in list(self._values):
+            if frame < (min(index, spared_from) if kind == spared else index):
+                del self._values[kind, frame]
 
     def __len__(self) -> int:
         """Return how many values are kept."""

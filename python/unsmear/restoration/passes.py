@@ -99,7 +99,7 @@ class Passes:
     def forget_before(self, index: int) -> None:
         """Drop what no frame from ``index`` on needs."""
         for back, chain in enumerate(reversed(self._chains)):
-            chain.forget_before(index - back * KEPT_BEHIND)
+            chain.forget_before(index, guided=back * KEPT_BEHIND)
 
 
 def _promising(result: Restored) -> bool:
