@@ -88,12 +88,21 @@ def test_equals_the_clip_in_memory_wherever_it_is_taken_up(
 def test_frames_restored_by_themselves_equal_those_in_memory(
     tmp_path: Path, clip: Path, blurred, method: str
 ) -> None:
-    unsmear.deblur_clip(clip, tmp_path / "out.tif", flow_method=method, **QUICK)
+    samples = unsmear.deblur_clip(
+        clip, tmp_path / "out.tif", flow_method=method, samples=True, **QUICK
+    ).samples
     made = unsmear.read_frames(tmp_path / "out.tif")
     for index in (0, 3, COUNT - 1):
         velocity, _ = velocity_of_frame(blurred, index, method=method)
         alone = unsmear.deblur(blurred[index], velocity, **QUICK).image
         np.testing.assert_array_equal(made[index], alone)
+        confidence = samples[index].confidence
+        if method == "least-squares":  # pools many frames
+            assert confidence is None
+            continue
+        pair = [index, index + 1 if index + 1 < COUNT else index - 1]
+        between = unsmear.optical_flow(blurred[pair], index=0, method=method)
+        np.testing.assert_array_equal(confidence, between.confidence)
 
 
 @pytest.mark.parametrize("target", ["out.mp4", "out.avi", "out.gif", "out.tif", "out"])
@@ -118,6 +127,8 @@ def test_same_bytes_after_a_break(
         )
         assert made.taken_up_at == max(stops, default=0)
         assert [sample.index for sample in made.samples] == list(range(COUNT))
+        # The motion was given.
+        assert all(sample.confidence is None for sample in made.samples)
     whole, broken = (
         {
             path.relative_to(tmp_path / name): path.read_bytes()

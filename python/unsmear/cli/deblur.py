@@ -152,6 +152,7 @@ def _write_report(options: argparse.Namespace, made: ClipResult) -> None:
         np.stack([sample.blurred for sample in made.samples]),
         restored=np.stack([sample.restored for sample in made.samples]),
         flows=[sample.flow for sample in made.samples],
+        confidences=[sample.confidence for sample in made.samples],
         exposure=float(np.mean([report["exposure"] for report in made.reports])),
         verdicts=[
             f"frame {sample.index}: {text}"

@@ -18,7 +18,11 @@ from unsmear.images import as_path
 from unsmear.sequence import settings_of
 from unsmear.streaming.clip import Clip, open_clip
 from unsmear.streaming.part_folder import PartFolder
-from unsmear.streaming.restorers import by_the_chain, one_by_one
+from unsmear.streaming.restorers import (
+    by_the_chain,
+    confidence_between,
+    one_by_one,
+)
 from unsmear.streaming.results import ClipResult, Sample
 from unsmear.streaming.targets import writer_for
 
@@ -166,7 +170,8 @@ def deblur_clip(
             restored = _restored(clip, part.done, options, motion)
             _work(clip, part, restored, progress)
             reports = list(part.reports())
-            shown = _samples(clip, part) if samples else []
+            measured = motion is None
+            shown = _samples(clip, part, options, measured=measured) if samples else []
             writer.publish(part.pieces, path, part.path)
     return ClipResult(path, len(clip), taken_up_at, reports, writer.warnings, shown)
 
@@ -246,9 +251,22 @@ def _sampled(clip: Clip) -> list[int]:
     return sorted({int(i) for i in np.linspace(0, len(clip) - 1, count).round()})
 
 
-def _samples(clip: Clip, part: PartFolder) -> list[Sample]:
+def _samples(
+    clip: Clip, part: PartFolder, options: dict[str, Any], *, measured: bool
+) -> list[Sample]:
+    def confidence(index: int) -> NDArray[np.float32] | None:
+        if not measured:
+            return None
+        method, parameters = options["flow_method"], options["flow_parameters"]
+        return confidence_between(clip, index, method, parameters)
+
     return [
-        Sample(index, np.array(clip[index]), **part.sample(index))
+        Sample(
+            index,
+            np.array(clip[index]),
+            confidence=confidence(index),
+            **part.sample(index),
+        )
         for index in _sampled(clip)
     ]
 

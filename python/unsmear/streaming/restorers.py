@@ -14,6 +14,7 @@ import numpy as np
 
 from unsmear._parameters import merged
 from unsmear.deblur import deblur
+from unsmear.flow import optical_flow
 from unsmear.restoration.source import Source
 from unsmear.sequence import restored_frames
 from unsmear.velocity import velocity_of_frame
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     Restored = tuple[NDArray[Any], NDArray[np.float32], dict[str, Any]]
 
-__all__ = ["by_the_chain", "frames_for_flow", "one_by_one"]
+__all__ = ["by_the_chain", "confidence_between", "frames_for_flow", "one_by_one"]
 
 POOLING = ("least-squares", "fleet-jepson", "thesis")
 POOLED = 15
@@ -98,6 +99,24 @@ def one_by_one(
             clip[index], velocity, channel_axis=2 if colour else None, **options
         )
         yield result.image, velocity, result.report
+
+
+def confidence_between(
+    clip: Clip, index: int, flow_method: str, flow_parameters: dict[str, Any]
+) -> NDArray[np.float32] | None:
+    """Return how far the motion between a frame and its neighbour can be trusted.
+
+    None for methods that pool many frames, and for a frame alone.
+    """
+    if flow_method in POOLING or len(clip) == 1:
+        return None
+    neighbour = index + 1 if index + 1 < len(clip) else index - 1
+    pair = np.stack([clip[index], clip[neighbour]])
+    axis = 3 if len(clip.shape) == 4 else None
+    found = optical_flow(
+        pair, index=0, method=flow_method, channel_axis=axis, **flow_parameters
+    )
+    return found.confidence
 
 
 def frames_for_flow(

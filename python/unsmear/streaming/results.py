@@ -26,12 +26,17 @@ class Sample:
         As it came and as it was written.
     flow : ndarray of shape (H, W, 2), float32
         Velocity at mid-exposure, px/frame; NaN = unknown.
+    confidence : ndarray of shape (H, W), float32, or None
+        Of the motion to the next frame (of the last, to the one before) measured on the
+        frames as they came, in [0, 1]; None where motion was given or pooled over many
+        frames.
     """
 
     index: int
     blurred: NDArray[Any]
     restored: NDArray[Any]
     flow: NDArray[np.float32]
+    confidence: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
