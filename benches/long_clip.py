@@ -180,6 +180,8 @@ def finished(target: Path) -> int:
 
 def interrupt(folder: Path, count: int, size: tuple[int, int], times: int) -> bool:
     """Interrupt at random moments and measure how long the end takes."""
+    # A shell ignores interrupts for what it starts in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     clip = prepared(folder, count, size)
     chance = random.Random(1)
     delays = []

@@ -106,6 +106,28 @@ def test_a_forked_child_has_threads_of_its_own(method: str) -> None:
     assert bytes_of(method) == expected
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.parametrize("method", METHODS)
+def test_large_pictures_start_no_other_threads(method: str) -> None:
+    """Threads that `fork` leaves behind unnoticed would be waited for, for ever."""
+    child = run_python(f"""
+        import os, signal, warnings, numpy as np, unsmear
+        warnings.simplefilter("ignore")
+        # More vectors than one thread hands over to NumPy by itself.
+        frames = np.random.default_rng(0).random((3, 260, 300), np.float32)
+        more = {{"fleet-jepson": 12}}.get({method!r}, 0)
+        frames = np.concatenate([frames, np.repeat(frames[-1:], more, 0)])
+        unsmear.optical_flow(frames, method={method!r})
+        pid = os.fork()
+        if pid == 0:
+            signal.alarm(50)  # ends the child, should it wait
+            unsmear.optical_flow(frames, method={method!r})
+            os._exit(0)
+        print(os.waitpid(pid, 0)[1])
+    """)
+    assert child.stdout.strip() == "0", child.stderr
+
+
 def run_python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", textwrap.dedent(code)],

@@ -1,7 +1,7 @@
 //! NumPy arrays to core types and back: views in, moved buffers out.
 
 use ndarray::{Array2, Array3, Axis};
-use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray3};
+use numpy::{Element, IntoPyArray, PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use unsmear::{Error, FlowField, FlowView, Real, Result};
@@ -25,15 +25,8 @@ pub(crate) fn flow_view<'a, T: Real + Element>(
     FlowView::new(u, v)
 }
 
-/// A field as one array (H, W, 2).
-pub(crate) fn flow_to_python<T: Real + Element>(
-    py: Python<'_>,
-    flow: FlowField<T>,
-) -> Bound<'_, PyArray3<T>> {
-    interleaved(&flow).into_pyarray(py)
-}
-
-/// (H, W, 2), by the threads of the pool it is called in.
+/// A field as one array (H, W, 2), by the threads of the pool: to be called in [`run`](crate::threads::run), for elsewhere
+/// it would start a second pool, which `fork` would leave without threads.
 pub(crate) fn interleaved<T: Real>(flow: &FlowField<T>) -> Array3<T> {
     let (height, width) = flow.dim();
     let mut both = Vec::with_capacity(height * width);

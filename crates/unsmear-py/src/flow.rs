@@ -1,11 +1,11 @@
 //! Flow methods, single precision and, for proofs, double.
 
-use numpy::{Element, PyReadonlyArray3};
+use numpy::{Element, IntoPyArray, PyReadonlyArray3};
 use pyo3::prelude::*;
 use unsmear::flow::Estimate;
 use unsmear::{Control, Real, Result};
 
-use crate::arrays::{flow_to_python, picture_to_python};
+use crate::arrays::{interleaved, picture_to_python};
 use crate::parameters;
 use crate::threads::run;
 
@@ -55,7 +55,10 @@ fn estimate<T: Real + Element>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Control) -> Result<Estimate<T>> + Send,
 ) -> PyResult<FlowAndConfidence> {
-    let estimate = run(py, progress, work)?;
-    let flow = flow_to_python(py, estimate.flow).into_any().unbind();
-    Ok((flow, picture_to_python(py, estimate.confidence).into_any().unbind()))
+    let (flow, confidence) = run(py, progress, |control| {
+        let Estimate { flow, confidence } = work(control)?;
+        Ok((interleaved(&flow), confidence))
+    })?;
+    let flow = flow.into_pyarray(py).into_any().unbind();
+    Ok((flow, picture_to_python(py, confidence).into_any().unbind()))
 }

@@ -12,7 +12,7 @@ use unsmear::motion_path::MotionPaths;
 use unsmear::restoration::{self, Walk};
 use unsmear::{Control, Error, FlowField, Result};
 
-use crate::arrays::flow_to_python;
+use crate::arrays::interleaved;
 use crate::errors::to_python;
 use crate::threads::run;
 
@@ -153,9 +153,12 @@ pub(crate) fn frame_motion<'py>(
         let [forward, backward, acceleration] = fields;
         let (forward, backward, acceleration) = (forward?, backward?, acceleration?);
         let acceleration = acceleration.as_ref();
-        restoration::frame_motion(forward.as_ref(), backward.as_ref(), acceleration, control)
+        let (forward, backward) = (forward.as_ref(), backward.as_ref());
+        let motion = restoration::frame_motion(forward, backward, acceleration, control)?;
+        Ok([motion.velocity, motion.acceleration].map(|field| interleaved(&field)))
     })?;
-    Ok((flow_to_python(py, motion.velocity), flow_to_python(py, motion.acceleration)))
+    let [velocity, acceleration] = motion.map(|field| field.into_pyarray(py));
+    Ok((velocity, acceleration))
 }
 
 /// 1 (H, W) where the light of a pixel comes from one motion, 0 where its path crosses a jump of the flow.

@@ -14,7 +14,7 @@ use unsmear::flow::thesis::gated_mean::GatedMean;
 use unsmear::flow::thesis::moving_pixels;
 use unsmear::fourier::Fft2;
 
-use crate::arrays::flow_to_python;
+use crate::arrays::interleaved;
 use crate::errors::to_python;
 use crate::parameters;
 use crate::threads::run;
@@ -30,8 +30,8 @@ pub(crate) fn thesis_flow<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let method = parameters::thesis_flow(parameters)?;
     let frames = frames.as_array();
-    let flow = run(py, progress, |control| method.estimate(frames, control))?;
-    Ok(flow_to_python(py, flow))
+    let flow = run(py, progress, |go| Ok(interleaved(&method.estimate(frames, go)?)))?;
+    Ok(flow.into_pyarray(py))
 }
 
 /// The parts of the founding bank: sigma, angles, temporal taps, and of each filter the window,

@@ -1,7 +1,6 @@
 //! Shape checks and the one way of running over rows in parallel.
 //!
-//! Results never depend on the number of threads: work is parallel over *outputs* only, each computed by the same
-//! instructions in the same order whoever computes it, and nothing is summed across threads.
+//! Results never depend on the number of threads; see [`crate::tasks`].
 
 use ndarray::{ArrayView2, ArrayView3};
 

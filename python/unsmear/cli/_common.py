@@ -6,6 +6,8 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from unsmear._parameters import PARAMETERS, of_pairs
 from unsmear._plain_data import plain_data
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     import argparse
 
     from numpy.typing import NDArray
+
+    from unsmear.streaming.results import ClipResult
 
 FRAMES_HELP = "folder, glob in quotes, picture files, image stack or video"
 
@@ -51,6 +55,16 @@ def add_flow_method(verb: argparse.ArgumentParser, option: str, default: str) ->
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
     """Parse NAME=VALUE pairs; a value is JSON if it can be, else text."""
     return of_pairs(options.parameter, "--parameter must look like NAME=VALUE")
+
+
+def found_in(made: ClipResult) -> dict[str, Any]:
+    """Return what the reports of a clip say in common."""
+    warnings = {text for report in made.reports for text in report.get("warnings", [])}
+    return {
+        "exposure": float(np.mean([report["exposure"] for report in made.reports])),
+        "verdicts": sorted({r["verdict"] for r in made.reports if "verdict" in r}),
+        "warnings": [*made.warnings, *sorted(warnings)],
+    }
 
 
 def show_result(result: dict[str, Any], *, as_json: bool) -> None:

@@ -7,8 +7,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from unsmear._progress import ProgressBar
 from unsmear.cli import _common
 from unsmear.streaming.several_clips import (
@@ -136,14 +134,11 @@ def _told(outcome: ClipOutcome) -> dict[str, Any]:
     made = outcome.result
     if made is None:
         return told
-    warnings = {text for report in made.reports for text in report.get("warnings", [])}
     return told | {
         "written": outcome.target,
         "frames": made.count,
         "taken up at frame": made.taken_up_at,
-        "exposure": float(np.mean([report["exposure"] for report in made.reports])),
-        "verdicts": sorted({r["verdict"] for r in made.reports if "verdict" in r}),
-        "warnings": [*made.warnings, *sorted(warnings)],
+        **_common.found_in(made),
         "reports": made.reports,
     }
 

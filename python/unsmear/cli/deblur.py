@@ -119,13 +119,10 @@ def run(options: argparse.Namespace) -> int | None:
         )
     if options.report:
         _write_report(options, made)
-    warnings = {text for report in made.reports for text in report.get("warnings", [])}
     result: dict[str, Any] = {
         "frames": made.count,
         "method": options.method,
-        "exposure": float(np.mean([report["exposure"] for report in made.reports])),
-        "verdicts": sorted({r["verdict"] for r in made.reports if "verdict" in r}),
-        "warnings": [*made.warnings, *sorted(warnings)],
+        **_common.found_in(made),
         "written": options.output,
     }
     if options.resume:

@@ -209,6 +209,26 @@ mod tests {
         }
     }
 
+    /// A wave reads the same in a block, after the last block and alone.
+    #[test]
+    fn many_waves_at_once_are_as_one_by_one() {
+        let table = PathSpectrum::new(6.0);
+        let n = 2 * LANES + 5;
+        let line = |step: f32| (0..n).map(|i| (step * i as f32).sin() * 2.7).collect::<Vec<f32>>();
+        let (x, y, own) = (line(0.7), line(1.3), line(0.2));
+        // Beyond the last a for some of the waves.
+        let motion = ([0.1, -0.05], [90.0, 40.0], [1.5, -0.5]);
+        let mut together = vec![0.5f32; n];
+        table.add(0.3, [&x, &y, &own], motion.0, motion.1, motion.2, &mut together);
+        for i in 0..n {
+            let one = [&x[i..=i], &y[i..=i], &own[i..=i]];
+            let mut alone = [0.5];
+            table.add(0.3, one, motion.0, motion.1, motion.2, &mut alone);
+            // The same operations on the same numbers.
+            assert_eq!(alone[0], together[i], "wave {i}");
+        }
+    }
+
     #[test]
     fn continues_beyond_its_end() {
         let table = PathSpectrum::new(0.0);

@@ -109,6 +109,7 @@ impl CoarseToFine {
         let ways = [*sequence, reversed];
         let ways = &ways[..=usize::from(self.forward_backward)];
         control.expect(ways.iter().map(|way| self.steps(way, (height, width))).sum());
+        // From the first row read on; each level calls those who have fallen asleep.
         awake(|| {
             let (mut estimate, levels) = self.one_way(sequence, true, control)?;
             for way in &ways[1..] {

@@ -29,6 +29,7 @@ use super::guide::median_guide;
 use super::level::{Level, Settings};
 use super::precision::precision;
 use super::rows::{Planes, for_each_band, for_each_rows, row_of};
+use crate::array::FEWEST_ROWS;
 use crate::control::Control;
 use crate::error::Result;
 use crate::flow_field::FlowField;
@@ -236,21 +237,15 @@ fn matrix_of(data: &DataTerm<'_>, flow: Planes<'_>, control: &Control) -> Result
     let width = data.width;
     let mut matrix = [(); 3].map(|()| filled(0.0, flow[0].len()));
     let planes = matrix.each_mut().map(|plane| &mut plane[..]);
-    for_each_band(
-        planes,
-        [width; 3],
-        crate::array::FEWEST_ROWS..=usize::MAX,
-        control,
-        |first, mut band| {
-            let (mut c1, mut c2) = (vec![0.0; width], vec![0.0; width]);
-            for i in 0..band[0].len() / width {
-                control.check()?;
-                let [a11, a12, a22] = row_of(&mut band, [width; 3], i);
-                data.equations(first + i, flow, [a11, a12, a22, &mut c1, &mut c2]);
-            }
-            Ok(())
-        },
-    )?;
+    for_each_band(planes, [width; 3], FEWEST_ROWS..=usize::MAX, control, |first, mut band| {
+        let (mut c1, mut c2) = (vec![0.0; width], vec![0.0; width]);
+        for i in 0..band[0].len() / width {
+            control.check()?;
+            let [a11, a12, a22] = row_of(&mut band, [width; 3], i);
+            data.equations(first + i, flow, [a11, a12, a22, &mut c1, &mut c2]);
+        }
+        Ok(())
+    })?;
     Ok(matrix)
 }
 
