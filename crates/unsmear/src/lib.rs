@@ -44,12 +44,12 @@
 //! | 16 | `exposure::search` | |
 //! | 17 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
-//! | 3 | `motion_operator::lanes`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
-//! | 4 | `motion_operator::record`, `motion_operator::strands` | |
+//! | 3 | `motion_operator::lanes`, `motion_operator::bands`, `motion_operator::spline_inverse`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
+//! | 4 | `motion_operator::record`, `motion_operator::strands`, `motion_operator::stencil` | |
 //! | 5 | `motion_operator::group` | |
 //! | 6 | `motion_operator::scatter` | |
 //! | 12 | [`motion_path`], [`kernel_operator`] | paths; one kernel for the whole picture |
-//! | 13 | `motion_operator::plan` | |
+//! | 13 | `motion_operator::plan`, `motion_operator::short_paths` | |
 //! | 14 | `motion_operator::expand` | |
 //! | 15 | `motion_operator::sweep` | |
 //! | 16 | [`motion_operator`] | blur along the path of every pixel |

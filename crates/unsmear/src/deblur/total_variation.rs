@@ -4,11 +4,11 @@
 //! 2. At full size the first turns, with the prior of power 1/2 and lambda from the noise alone:
 //!
 //! ```text
-//! lambda = 0.085 s^1.25 f(L),      s^2 = sigma^2 + 0.15^2
+//! lambda = max(0.085 s^(5/4), 0.4 s^(3/2) L^(-3/4)),      s^2 = sigma^2 + 0.15^2
 //! ```
 //!
-//!    f = 2 for a mean blur L of up to 3 px, falling to 1 at 6 px: a short blur averages little noise away, and the less it
-//!    does the more of it is left to the prior.
+//!    L the mean blur, at least 3 px. A blur averages over L samples: the shorter it is and the stronger the noise, the more
+//!    of the noise is left to the prior. The second rule is the larger below some 8 px at noise of 1, 13 px at noise of 5.
 //!
 //! 3. What the model cannot explain is treated as further noise, and single samples that it cannot explain at all weigh
 //!    little (Cauchy, c = 3 max(sigma, 0.7)):
@@ -33,11 +33,14 @@ use crate::motion_operator::{MotionOperator, Taps};
 /// lambda of unit noise, and the exponent of the noise: the best of grids over photographs at noise .3 to 5.
 const STRENGTH: (f64, f64) = (0.085, 1.25);
 
-/// Mean blur, px, up to which lambda is [`SHORT_BLUR_GAIN`] times as strong, and from which it is as it is.
-const SHORT_BLUR: (f64, f64) = (3.0, 6.0);
+/// The same where blur is short: lambda of unit noise at a blur of 1 px, and the exponent of the noise.
+const SHORT_STRENGTH: (f64, f64) = (0.4, 1.5);
 
-/// The best of 1, 1.5, 2 and 3 for a blur of 3 px, at noise 0, 1 and 5 of four photographs.
-const SHORT_BLUR_GAIN: f64 = 2.0;
+/// The exponent of the blur there.
+const SHORTNESS: f64 = -0.75;
+
+/// Mean blur, px, below which that rises no more: it leaves texture where the noise is measured, which reads too high.
+const SHORTEST: f64 = 3.0;
 
 /// Blur, px, below which a pixel counts as still.
 const STILL: f32 = 0.5;
@@ -133,9 +136,8 @@ impl TotalVariation {
         };
         control.expect(self.effort.steps(channels));
         let floor = self.noise.powi(2) + MODEL_NOISE.powi(2);
-        let gain = short_blur_gain(looks);
-        let lambda = self.lambda.unwrap_or(gain * strength(STRENGTH, floor));
-        let (operators, pad) = operators(looks, Taps::Cubic)?;
+        let lambda = self.lambda.unwrap_or_else(|| first_strength(floor, mean_blur(looks)));
+        let (operators, pad) = operators(looks, Taps::Spline)?;
         let start = self.half_size(looks, &operators[0], lambda, control)?;
         let data = data(looks, &operators)?;
         drop(given);
@@ -203,8 +205,8 @@ fn stage(prior: Prior, lambda: f64, (turns, steps): (usize, usize)) -> Variation
     Variational { lambda, prior: Some(prior), robust: None, turns, steps }
 }
 
-/// f(L) of the mean blur of the pixels that move.
-fn short_blur_gain(looks: &[Look<'_>]) -> f64 {
+/// Mean blur of the pixels that move, px; infinite if none does.
+fn mean_blur(looks: &[Look<'_>]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for look in looks {
         let velocity = &look.paths.velocity;
@@ -217,11 +219,13 @@ fn short_blur_gain(looks: &[Look<'_>]) -> f64 {
             }
         }
     }
-    if count == 0.0 {
-        return 1.0;
-    }
-    let share = (SHORT_BLUR.1 - sum / count) / (SHORT_BLUR.1 - SHORT_BLUR.0);
-    1.0 + (SHORT_BLUR_GAIN - 1.0) * share.clamp(0.0, 1.0)
+    if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+/// lambda for a right motion; see the head of this file.
+fn first_strength(noise_power: f64, blur: f64) -> f64 {
+    let short = strength(SHORT_STRENGTH, noise_power) * blur.max(SHORTEST).powf(SHORTNESS);
+    strength(STRENGTH, noise_power).max(short)
 }
 
 fn strength((unit, exponent): (f64, f64), noise_power: f64) -> f64 {

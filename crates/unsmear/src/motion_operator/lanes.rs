@@ -25,6 +25,9 @@
 pub enum Taps {
     /// Keys' cubic: accurate, some weights negative.
     Cubic,
+    /// As [`Taps::Cubic`], but an interpolating cubic spline sampled along the path itself where that is short; see
+    /// `short_paths.rs`. Where the padding is too narrow for it, as the cubic.
+    Spline,
     /// The triangle: faster and less accurate, no weight negative, as Richardson-Lucy needs it.
     Linear,
 }
@@ -33,7 +36,7 @@ impl Taps {
     /// Where the kernel ends, px.
     pub(super) fn reach(self) -> usize {
         match self {
-            Self::Cubic => 2,
+            Self::Cubic | Self::Spline => 2,
             Self::Linear => 1,
         }
     }

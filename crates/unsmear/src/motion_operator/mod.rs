@@ -14,7 +14,8 @@
 //! ```
 //!
 //! z_k the major offset of line k from the pixel, z_0 < z_1 the path's ends, C the integral of kappa,
-//! S the speed; beyond its ends the path goes on straight. kappa is Keys' cubic (slope -1/2) or the triangle.
+//! S the speed; beyond its ends the path goes on straight. kappa is Keys' cubic (slope -1/2) or the triangle. Lines are
+//! too coarse for fine detail under a blur of a few pixels: with [`Taps::Spline`] short paths go by `short_paths.rs`.
 //! The adjoint is the same sum as a scatter, in bands of rows: first every other band, then those between, so that
 //! none writes where another does, in an order that does not depend on the number of threads.
 //!
@@ -28,12 +29,16 @@
 //! "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29 (1981) 1153-1160,
 //! [10.1109/TASSP.1981.1163711](https://doi.org/10.1109/TASSP.1981.1163711).
 
+mod bands;
 mod expand;
 mod group;
 mod lanes;
 mod plan;
 mod record;
 mod scatter;
+mod short_paths;
+mod spline_inverse;
+mod stencil;
 mod strands;
 mod sweep;
 
@@ -44,19 +49,17 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::linear_operator::LinearOperator;
 use crate::motion_path::MotionPaths;
-use crate::tasks::{cut, for_each_task, runs};
+use crate::tasks::{cut, runs};
+use bands::{Bands, each};
 use lanes::LANES;
 use plan::RowPlan;
+use short_paths::ShortPaths;
 use sweep::{Scratch, Window, gather_row, normal_row, scatter_row};
 
 pub use lanes::Taps;
 
 /// Fewest rows gathered per task.
 const FEWEST_ROWS: usize = 8;
-/// Rows of data scattered per task, at least: half a millisecond of work on a wide picture, and several tasks per thread
-/// on a low one.
-const LEAST_BAND: usize = 32;
-
 /// The blur of [`MotionPaths`]; see the [module](self).
 ///
 /// Holds 12 (straight paths) to 30 bytes per pixel.
@@ -69,6 +72,8 @@ pub struct MotionOperator {
     pad: usize,
     /// Padding for which nothing is clamped.
     reach: usize,
+    /// Paths that the plans leave out.
+    short: Option<ShortPaths>,
 }
 
 impl MotionOperator {
@@ -87,6 +92,12 @@ impl MotionOperator {
                 return Err(Error::shape("paths", expected, field.u.shape()));
             }
         }
+        let short = match taps {
+            Taps::Spline if paths.reach() <= pad => ShortPaths::of(paths),
+            _ => None,
+        };
+        let others = short.as_ref().map(|short| short.others(paths));
+        let paths = others.as_ref().unwrap_or(paths);
         let row = |y| {
             if y > 0 && rows_agree(paths, y) { None } else { Some(RowPlan::new(paths, y, taps)) }
         };
@@ -98,7 +109,8 @@ impl MotionOperator {
         // A block wider than the picture writes zeros beyond it.
         let beyond = LANES.saturating_sub(width);
         let reach = plans.iter().map(|plan| plan.reach).max().unwrap_or(0) + beyond;
-        Ok(Self { plans, width, taps, pad, reach })
+        let reach = reach.max(short.as_ref().map_or(0, |short| short.reach));
+        Ok(Self { plans, width, taps, pad, reach, short })
     }
 
     /// A x for a padding that clamps nothing.
@@ -116,53 +128,28 @@ impl MotionOperator {
 
     /// A^T r for a padding that clamps nothing.
     fn scatter(&self, r: &[f32], pad: usize, x: &mut [f32]) {
-        let stride = self.width + 2 * pad;
-        let rows = r.chunks(self.width * self.band());
-        self.for_each_band(x, pad, rows, |y, place, rows| {
+        let bands = self.bands(pad);
+        bands.for_each(x, r.chunks(self.width * bands.rows()), |y, place, rows| {
             let mut scratch = Scratch::new();
-            let mut x = Window { samples: place, stride, start: self.reach * stride + pad };
+            let mut x = Window { samples: place, stride: bands.stride(), start: bands.place(0) };
             for (i, row) in rows.chunks(self.width).enumerate() {
                 scatter_row(&self.plans[y + i], self.taps, row, &mut x, &mut scratch);
-                x.start += stride;
+                x.start += bands.stride();
             }
         });
     }
 
-    /// Rows of data scattered by one task: twice what it writes beyond them, so that every other one may run.
-    fn band(&self) -> usize {
-        LEAST_BAND.max(2 * self.reach)
+    /// How data lie in a picture padded by `pad`.
+    fn bands(&self, pad: usize) -> Bands {
+        Bands { width: self.width, pad, reach: self.reach }
     }
 
-    /// Calls `task(first row, rows of x within reach, data)` for every band of rows, two phases of them in parallel; x starts
-    /// as 0. The places of the first phase are all of x, so that it clears them where it is about to write.
-    fn for_each_band<D: Send>(
-        &self,
-        x: &mut [f32],
-        pad: usize,
-        data: impl Iterator<Item = D>,
-        task: impl Fn(usize, &mut [f32], D) + Sync,
-    ) {
-        let (stride, band) = (self.width + 2 * pad, self.band());
-        let (mut even, mut odd) = (Vec::new(), Vec::new());
-        for (i, data) in data.enumerate() {
-            if i % 2 == 0 { even.push(Some(data)) } else { odd.push(Some(data)) }
-        }
-        // Band number i writes from `reach` rows above its first to as many below its last.
-        let above = (pad - self.reach) * stride;
-        x[..above].fill(0.0);
-        for (phase, mut data) in [even, odd].into_iter().enumerate() {
-            let from = (above + phase * band * stride).min(x.len());
-            let places = x[from..].chunks_mut(2 * band * stride);
-            let count = places.len();
-            data.resize_with(count, || None);
-            each(places.zip(data).enumerate(), count, |(i, (place, data))| {
-                if phase == 0 {
-                    place.fill(0.0);
-                }
-                if let Some(data) = data {
-                    task((2 * i + phase) * band, place, data);
-                }
-            });
+    /// Adds the transpose of what the paths that are not short do, `short` ones being there.
+    fn add_others(&self, short: &ShortPaths, r: &[f32], x: &mut [f32]) {
+        if !short.everywhere {
+            let mut more = vec![0.0; x.len()];
+            self.scatter(&short.left_of(r), self.pad, &mut more);
+            x.iter_mut().zip(&more).for_each(|(x, more)| *x += more);
         }
     }
 
@@ -190,6 +177,12 @@ impl LinearOperator for MotionOperator {
         let (rows, columns) = self.unknown_shape();
         assert_eq!(x.len(), rows * columns, "x has the shape of the unknown");
         assert_eq!(b.len(), self.plans.len() * self.width, "b has the shape of the data");
+        if let Some(short) = &self.short {
+            if !short.everywhere {
+                self.gather(x, self.pad, b);
+            }
+            return short.apply(x, b, &self.bands(self.pad));
+        }
         if self.reach <= self.pad {
             return self.gather(x, self.pad, b);
         }
@@ -206,6 +199,10 @@ impl LinearOperator for MotionOperator {
         let (rows, columns) = self.unknown_shape();
         assert_eq!(x.len(), rows * columns, "x has the shape of the unknown");
         assert_eq!(r.len(), self.plans.len() * self.width, "r has the shape of the data");
+        if let Some(short) = &self.short {
+            short.adjoint(r, x, &self.bands(self.pad));
+            return self.add_others(short, r, x);
+        }
         if self.reach <= self.pad {
             return self.scatter(r, self.pad, x);
         }
@@ -235,13 +232,21 @@ impl LinearOperator for MotionOperator {
             let weighted: Vec<f32> = b.iter().zip(weights).map(|(b, w)| b * w).collect();
             return self.adjoint(&weighted, out);
         }
-        let (pad, chunk) = (self.pad, self.width * self.band());
+        let bands = self.bands(self.pad);
+        if let Some(short) = &self.short {
+            if !short.everywhere {
+                self.gather(x, self.pad, b);
+            }
+            short.normal(x, weights, b, out, &bands);
+            let weighted: Vec<f32> = b.iter().zip(weights).map(|(b, w)| b * w).collect();
+            return self.add_others(short, &weighted, out);
+        }
+        let chunk = self.width * bands.rows();
         let data = b.chunks_mut(chunk).zip(weights.chunks(chunk));
-        self.for_each_band(out, pad, data, |y, place, (b, weights)| {
+        bands.for_each(out, data, |y, place, (b, weights)| {
             let mut scratch = Scratch::new();
-            let mut x = Window { samples: x, stride: columns, start: (y + pad) * columns + pad };
-            let start = self.reach * columns + pad;
-            let mut out = Window { samples: place, stride: columns, start };
+            let mut x = Window { samples: x, stride: columns, start: bands.start(y) };
+            let mut out = Window { samples: place, stride: columns, start: bands.place(0) };
             let pairs = b.chunks_mut(self.width).zip(weights.chunks(self.width));
             for (i, (b, weights)) in pairs.enumerate() {
                 normal_row(&self.plans[y + i], self.taps, &x, weights, b, &mut out, &mut scratch);
@@ -250,15 +255,6 @@ impl LinearOperator for MotionOperator {
             }
         });
     }
-}
-
-/// Runs `task` on everything that `tasks` yields, about `count` of them, on all threads.
-fn each<T: Send>(tasks: impl Iterator<Item = T> + Send, count: usize, task: impl Fn(T) + Sync) {
-    let outcome = for_each_task(tasks, count, |item| {
-        task(item);
-        Ok(())
-    });
-    debug_assert!(outcome.is_ok(), "no task fails");
 }
 
 /// Whether row `y` has the paths of the row above, bit for bit.

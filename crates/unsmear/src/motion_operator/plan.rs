@@ -119,7 +119,7 @@ impl RowPlan {
         record.planes = (self.lanes.len() - record.lanes as usize) as u8;
         let (before, lanes) = (self.lines.len(), record.lanes_of(&self.lanes));
         let sums = match taps {
-            Taps::Cubic => survey::<true>(&record, lanes, &mut self.lines),
+            Taps::Cubic | Taps::Spline => survey::<true>(&record, lanes, &mut self.lines),
             Taps::Linear => survey::<false>(&record, lanes, &mut self.lines),
         };
         for (gain, sum) in self.lanes[record.lanes as usize].0.iter_mut().zip(sums.0) {

@@ -157,7 +157,7 @@ fn renew<const N: usize>(
     rows: &mut Expanded<N>,
 ) {
     match taps {
-        Taps::Cubic => rows.renew::<true>(plan, group, records),
+        Taps::Cubic | Taps::Spline => rows.renew::<true>(plan, group, records),
         Taps::Linear => rows.renew::<false>(plan, group, records),
     }
 }
