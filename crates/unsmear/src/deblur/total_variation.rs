@@ -231,3 +231,22 @@ fn first_strength(noise_power: f64, blur: f64) -> f64 {
 fn strength((unit, exponent): (f64, f64), noise_power: f64) -> f64 {
     unit * noise_power.powf(0.5 * exponent)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strength_grows_with_noise_and_falls_with_blur() {
+        let at = |noise: f64, blur| first_strength(noise * noise, blur);
+        for noise in [0.3, 1.0, 5.0] {
+            assert!(at(noise, 3.0) > at(noise, 5.0) && at(noise, 5.0) >= at(noise, 40.0));
+            assert_eq!(at(noise, 1.0), at(noise, 3.0));
+            assert_eq!(at(noise, f64::INFINITY), 0.085 * noise.powf(1.25));
+        }
+        // 0.4 / 3^(3/4) against 0.085; the rules meet at 7.9 px for noise of 1, 15 px for 5.
+        assert!((at(1.0, 3.0) / 0.085 - 2.064).abs() < 1e-2);
+        assert!(at(1.0, 7.5) > 0.085 && (at(1.0, 8.0) - 0.085).abs() < 1e-9);
+        assert!(at(5.0, 13.0) > at(5.0, 16.0));
+    }
+}
