@@ -212,3 +212,6 @@ fn put(sum: &Lanes, own: &Lanes, out: &mut [f32]) {
         *out = if own > 0.0 { sum } else { *out };
     }
 }
+
+#[cfg(test)]
+mod tests;
