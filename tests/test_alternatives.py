@@ -13,9 +13,15 @@ from unsmear.restoration.records import Restored, Settings
 SETTINGS = Settings(None, None, "balanced", {}, 1, 0)
 
 
-def frame(ratio: float, exposure: float, likeliest: float | None = None) -> Restored:
+def frame(
+    ratio: float,
+    exposure: float,
+    likeliest: float | None = None,
+    blur: float = 9.0,
+) -> Restored:
     report: dict[str, Any] = {
         "exposure": exposure,
+        "blur_px": blur,
         "exposure_status": "unsure",
         "exposure_found": {"likeliest": likeliest},
     }
@@ -61,3 +67,12 @@ def test_ratios_and_the_search_decide(
     assert best.report["exposure"] == expected
     assert best.report["exposure_status"] == "unsure"
     assert (chain is own) == (expected == 1.0)
+
+
+def test_of_short_blur_twins_know_nothing() -> None:
+    source: Any = None
+    others = Alternatives(source, lambda index: np.zeros(index), SETTINGS)
+    result, chain = frame(0.9, 0.6, 0.7, blur=2.0), object()
+    own: Any = chain
+    # No other exposure is tried: there is no clip to try it on.
+    assert others.best(0, result, own) == (result, own)

@@ -34,7 +34,8 @@ class ExposureEstimate:
         cautious value, for blur taken too short does little harm.
     status : {"ok", "unsure", "small"}
         "unsure": parts of the picture or assumptions about it disagree, or nothing
-        could be measured; "small": because hardly anything moves by 3 px.
+        could be measured; "small": because hardly anything moves by 3 px, so that no
+        wave is missing and only how far they are dimmed tells, from .4 to .8.
     vote : float
         Share, in [0, 1], of twelve assumptions on the scene's spectrum that agree;
         NaN without tiles.

@@ -37,7 +37,7 @@
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
-//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random` | parts of the search for the exposure |
+//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random`, `exposure::short_blur` | parts of the search for the exposure |
 //! | 13 | `exposure::tile` | |
 //! | 14 | `exposure::tile_choice`, `exposure::likelihood` | |
 //! | 15 | `exposure::vote` | |

@@ -23,6 +23,8 @@ ALTERNATIVES = (0.7, 1.4)
 """Exposures tried where the search was not sure, relative to the one assumed."""
 AS_GOOD = 1.05
 """Twins tell exposures apart whose ratios differ by more than this factor."""
+LEAST_BLUR = 4.0
+"""Blur (95 % quantile, px) from which twins tell exposures apart at all."""
 MOST_CHAINS = 4
 
 
@@ -37,7 +39,8 @@ class Alternatives:
     Twin frames err alike under a wrong exposure and hardly notice a small error of it;
     half as much again they do. Of those as good to them as the best the one next to
     what the search found likeliest is taken. An exposure longer than a shutter makes it
-    is tried only where the search found one.
+    is tried only where the search found one. Of blur without gaps in its spectrum twins
+    know nothing: they would take the longest for the best, and lose 1 to 8 dB.
     """
 
     def __init__(
@@ -55,6 +58,8 @@ class Alternatives:
         self, index: int, result: Restored, chain: Chain
     ) -> tuple[Restored, Chain]:
         """Return the restoration its twins, or the search among equals, speak for."""
+        if result.report["blur_px"] < LEAST_BLUR:
+            return result, chain
         value = result.report["exposure"]
         likeliest = result.report["exposure_found"]["likeliest"]
         found = likeliest is not None and LIMITS[0] < likeliest < LIMITS[1]

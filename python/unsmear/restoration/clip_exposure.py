@@ -6,7 +6,8 @@ how sharp they are,
     log s = sum w_j log s_j / sum w_j,   w_j = (1 - |j - i| / 3) / (spread_j^2 + .02^2),
 
 so that a shutter that stays as it is gives an exposure that stays as it is. Where less
-than half of them can be relied on, the frame's own cautious value is used.
+than half of them can be relied on, the frame's own cautious value is used; where it is
+cautious because blur is short, the mean over frames like it, by how near they are.
 """
 
 from __future__ import annotations
@@ -112,16 +113,25 @@ class ClipExposure:
             value, status = own["value"], own["status"]
             if status == "ok":
                 value, status = min(value, 1.0), "unsure"
+            elif status == "small":
+                alike = [j for j in near if self._found(j)["status"] == "small"]
+                value = self._mean(alike, [_nearness(j, index) for j in alike])
             return Exposure(float(value), status, own["noise"], own)
         weights = [
-            (1 - abs(j - index) / (SMOOTHED + 1))
-            / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
+            _nearness(j, index) / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
             for j in trusted
         ]
-        logs = [np.log(self._found(j)["value"]) for j in trusted]
-        value = float(np.exp(np.average(logs, weights=weights)))
+        value = self._mean(trusted, weights)
         status = "ok" if value <= LONGEST else "beyond"
         return Exposure(value, status, own["noise"], own)
+
+    def _mean(self, frames: list[int], weights: list[float]) -> float:
+        logs = [np.log(self._found(j)["value"]) for j in frames]
+        return float(np.exp(np.average(logs, weights=weights)))
+
+
+def _nearness(other: int, index: int) -> float:
+    return 1 - abs(other - index) / (SMOOTHED + 1)
 
 
 def _stack(fields: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -14,7 +14,8 @@
 //! shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
 //! the shapes' optima, 1 at most, for blur assumed too short does little harm and blur assumed too long does much.
 //! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
-//! fits it by chance. Without any tile s is 0.8; "small" says that this is because hardly anything moves by 3 px.
+//! fits it by chance. Blur too short for zeros is told roughly by how much it dims (`short_blur.rs`), which "small" says;
+//! without any tile s is 0.8.
 //!
 //! Validity: noise of known deviation, in the picture's units, white in the band; blur of 2.4 to about 60 px; no
 //! strong sharpening (it fills the zeros). Units: px, frames, rad/px.
@@ -24,13 +25,15 @@ mod likelihood;
 mod path_spectrum;
 mod random;
 mod search;
+mod short_blur;
 mod tile;
 mod tile_choice;
 mod vote;
 
 pub use self::frame::ExposureFrame;
 use self::random::Random;
-use self::search::{LEAST_BLUR, search};
+use self::search::{Evidence, Found, LEAST_BLUR, search};
+use self::short_blur::PRIOR;
 use self::tile_choice::choose_tiles;
 use self::vote::vote;
 use crate::array::require_same;
@@ -50,9 +53,6 @@ const TRUST: (f64, f64) = (0.6, 0.12);
 
 /// Greatest s while unsure.
 const MOST_UNSURE: f64 = 1.0;
-
-/// s when nothing tells.
-const PRIOR: f64 = 0.8;
 
 /// Speed whose 95 % quantile below it explains that no tile tells anything, px/frame.
 const SMALL: f64 = 3.0;
@@ -76,7 +76,7 @@ pub enum ExposureStatus {
     Ok,
     /// They do not, or nothing could be measured.
     Unsure,
-    /// Too little motion to tell, and to matter.
+    /// Too little motion to tell for sure, and to matter much.
     Small,
 }
 
@@ -114,16 +114,35 @@ impl ExposureSearch {
         let mut random = Random::new(self.seed);
         let beyond = (self.range.0 / MARGIN, self.range.1 * MARGIN);
         let noise = self.noise_used(frames, control)?;
-        let nothing = || Ok(without_tiles(frames, noise));
         if noise == 0.0 {
-            return nothing();
+            return Ok(without_tiles(frames, noise));
         }
-        let least_speed = LEAST_BLUR / beyond.1;
-        let chosen = choose_tiles(frames, noise, least_speed, &mut random, control)?;
-        let Some((waves, tiles)) = chosen else { return nothing() };
-        let Some(found) = search(&tiles, &waves, beyond, noise, &mut random, control)? else {
-            return nothing();
+        let mut ask = |slowest: f64| -> Result<(usize, Option<Evidence>)> {
+            let chosen = choose_tiles(frames, noise, slowest, &mut random, control)?;
+            let Some((waves, tiles)) = chosen else { return Ok((0, None)) };
+            let found = search(&tiles, &waves, beyond, noise, &mut random, control)?;
+            Ok((tiles.len(), Some(found)))
         };
+        let mut answer = ask(LEAST_BLUR / beyond.1)?;
+        if answer.0 < short_blur::ENOUGH_TILES && !matches!(answer.1, Some(Evidence::Zeros(_))) {
+            answer = ask(short_blur::SLOWEST)?;
+        }
+        Ok(match answer {
+            (_, Some(Evidence::Zeros(found))) => self.of_zeros(&found, noise),
+            (tiles, Some(Evidence::Dimming(of_shapes))) => {
+                let nothing = without_tiles(frames, noise);
+                if nothing.status != ExposureStatus::Small {
+                    return Ok(nothing);
+                }
+                let value = short_blur::cautious(&of_shapes).max(self.range.0);
+                ExposureEstimate { value, tiles, ..nothing }
+            }
+            (_, None) => without_tiles(frames, noise),
+        })
+    }
+
+    /// The likeliest share where it can be relied on, else a cautious one.
+    fn of_zeros(&self, found: &Found, noise: f64) -> ExposureEstimate {
         let agreement = vote(&found.of_shapes, found.log_scale);
         let (likeliest, spread, tiles) = (found.log_scale.exp(), found.spread, found.tiles);
         let credible = found.inside && (self.range.0..=self.range.1).contains(&likeliest);
@@ -133,7 +152,7 @@ impl ExposureSearch {
             let cautious = median(found.of_shapes).exp().min(MOST_UNSURE).max(self.range.0);
             (cautious, ExposureStatus::Unsure)
         };
-        Ok(ExposureEstimate { value, status, vote: agreement, spread, tiles, likeliest, noise })
+        ExposureEstimate { value, status, vote: agreement, spread, tiles, likeliest, noise }
     }
 
     fn validate<T: Real>(&self, frames: &[ExposureFrame<'_, T>]) -> Result<()> {

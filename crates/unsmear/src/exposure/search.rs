@@ -42,7 +42,15 @@ pub(super) struct Found {
     pub(super) tiles: usize,
 }
 
-/// Searches `range`; None when no tile is long enough.
+/// What there is to learn from tiles.
+pub(super) enum Evidence {
+    /// Zeros of the blur's spectrum in the band.
+    Zeros(Found),
+    /// Blur too short for them: optima of the shapes over all tiles.
+    Dimming([f64; SHAPES]),
+}
+
+/// Searches `range`.
 pub(super) fn search(
     tiles: &[Tile],
     waves: &Waves,
@@ -50,13 +58,16 @@ pub(super) fn search(
     noise: f64,
     random: &mut Random,
     control: &Control,
-) -> Result<Option<Found>> {
+) -> Result<Evidence> {
     let likelihoods = Likelihoods::new(tiles, waves, range.1, noise, control)?;
     let (first, octaves) = (range.0.ln(), (range.1 / range.0).ln());
     let steps = (octaves / STEPS[0]).ceil();
     let grid: Vec<f64> = (0..=steps as usize).map(|i| first + i as f64 / steps * octaves).collect();
     let all = likelihoods.curves(&grid)?;
-    let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else { return Ok(None) };
+    let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else {
+        let whole = optimum(all.iter().map(Vec::as_slice), &grid);
+        return Ok(Evidence::Dimming(whole.of_shapes));
+    };
     let log_scale = if coarse.inside {
         let fine: Vec<f64> =
             (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
@@ -68,7 +79,7 @@ pub(super) fn search(
     let chosen: Vec<&[f64]> = used.iter().map(|&i| all[i].as_slice()).collect();
     let spread = spread(&chosen, &grid, random);
     let Optimum { inside, of_shapes, .. } = coarse;
-    Ok(Some(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
+    Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
 }
 
 /// Likelihoods of the tiles on any grid.

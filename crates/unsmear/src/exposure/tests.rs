@@ -77,6 +77,25 @@ fn says_when_it_cannot_know() {
 }
 
 #[test]
+fn short_blur_is_told_from_shorter() {
+    let flow = constant(1.6 * 0.6f64.cos(), 1.6 * 0.6f64.sin());
+    let [open, half] = [1.0, 0.5].map(|share| {
+        let still = constant(0.0, 0.0);
+        let image = blurred(1.6 * share, 0.6, 0.5);
+        let frame =
+            ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
+        // The picture is all texture: its noise has to be told.
+        let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1 };
+        search.estimate(&[frame], &Control::new()).unwrap()
+    });
+    assert_eq!([open.status, half.status], [ExposureStatus::Small; 2]);
+    assert!(open.tiles > 0 && open.likeliest.is_nan());
+    // Neither is found exactly; the order is, and doubt shortens.
+    assert!(half.value + 0.1 < open.value && open.value <= PRIOR, "{half:?} {open:?}");
+    assert!(half.value >= 0.4, "{half:?}");
+}
+
+#[test]
 fn a_sharp_picture_is_not_found_to_be_blurred() {
     // Blurred by 1 px where things move by 20.
     let image = blurred(1.0, 0.6, 0.5);
