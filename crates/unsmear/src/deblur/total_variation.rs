@@ -7,8 +7,9 @@
 //! lambda = max(0.085 s^(5/4), 0.4 s^(3/2) L^(-3/4)),      s^2 = sigma^2 + 0.15^2
 //! ```
 //!
-//!    L the mean blur, at least 3 px. A blur averages over L samples: the shorter it is and the stronger the noise, the more
-//!    of the noise is left to the prior. The second rule is the larger below some 8 px at noise of 1, 13 px at noise of 5.
+//!    L the mean blur, at least 3 px; where that is beyond 7 px the second rule fades into the first, which is alone
+//!    from 9 px on. A blur averages over L samples: the shorter it is and the stronger the noise, the more of the noise is
+//!    left to the prior.
 //!
 //! 3. What the model cannot explain is treated as further noise, and single samples that it cannot explain at all weigh
 //!    little (Cauchy, c = 3 max(sigma, 0.7)):
@@ -38,6 +39,10 @@ const SHORT_STRENGTH: (f64, f64) = (0.4, 1.5);
 
 /// The exponent of the blur there.
 const SHORTNESS: f64 = -0.75;
+
+/// Mean blur, px, at which it begins to fade into the other, and at which it has: pictures of low contrast, hence of much
+/// noise in grey levels, would take it at 11 px for half a decibel less.
+const FADING: (f64, f64) = (7.0, 9.0);
 
 /// Mean blur, px, below which that rises no more: it leaves texture where the noise is measured, which reads too high.
 const SHORTEST: f64 = 3.0;
@@ -224,8 +229,10 @@ fn mean_blur(looks: &[Look<'_>]) -> f64 {
 
 /// lambda for a right motion; see the head of this file.
 fn first_strength(noise_power: f64, blur: f64) -> f64 {
+    let long = strength(STRENGTH, noise_power);
     let short = strength(SHORT_STRENGTH, noise_power) * blur.max(SHORTEST).powf(SHORTNESS);
-    strength(STRENGTH, noise_power).max(short)
+    let share = ((FADING.1 - blur) / (FADING.1 - FADING.0)).clamp(0.0, 1.0);
+    long + share * (short - long).max(0.0)
 }
 
 fn strength((unit, exponent): (f64, f64), noise_power: f64) -> f64 {
@@ -244,9 +251,11 @@ mod tests {
             assert_eq!(at(noise, 1.0), at(noise, 3.0));
             assert_eq!(at(noise, f64::INFINITY), 0.085 * noise.powf(1.25));
         }
-        // 0.4 / 3^(3/4) against 0.085; the rules meet at 7.9 px for noise of 1, 15 px for 5.
+        // 0.4 / 3^(3/4) against 0.085.
         assert!((at(1.0, 3.0) / 0.085 - 2.064).abs() < 1e-2);
-        assert!(at(1.0, 7.5) > 0.085 && (at(1.0, 8.0) - 0.085).abs() < 1e-9);
-        assert!(at(5.0, 13.0) > at(5.0, 16.0));
+        let (short, half) = (0.4 * 5f64.powf(1.5), at(5.0, 8.0));
+        assert!((at(5.0, 7.0) - short * 7f64.powf(-0.75)).abs() < 1e-9);
+        let long = at(5.0, 9.0);
+        assert!((half - 0.5 * (long + short * 8f64.powf(-0.75))).abs() < 1e-9);
     }
 }

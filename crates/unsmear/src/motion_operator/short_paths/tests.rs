@@ -47,8 +47,8 @@ fn short_paths_keep_waves_that_lines_fold() {
     let errors =
         [Taps::Spline, Taps::Cubic].map(|taps| error_on_a_wave(taps, [2.0, 2.0], [2.2, 2.1]));
     assert!(errors[0] < 0.06 && errors[1] > 0.2, "{errors:?}");
-    // No jump of quality at slow waves.
-    assert!(error_on_a_wave(Taps::Spline, [0.3, 0.2], [5.0, 3.0]) < 5e-4);
+    // Slow waves: the taps that `spline_inverse.rs` cuts off, 2 x 1.7e-4 (1 - cos 7 w) and less on either axis.
+    assert!(error_on_a_wave(Taps::Spline, [0.3, 0.2], [5.0, 3.0]) < 1e-3);
 }
 
 /// The spline by the library's other interpolation, and the mean over 200 moments instead of Gauss' rule.
