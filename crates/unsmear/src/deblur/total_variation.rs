@@ -40,8 +40,8 @@ const SHORT_STRENGTH: (f64, f64) = (0.4, 1.5);
 /// The exponent of the blur there.
 const SHORTNESS: f64 = -0.75;
 
-/// Mean blur, px, at which it begins to fade into the other, and at which it has: pictures of low contrast, hence of much
-/// noise in grey levels, would take it at 11 px for half a decibel less.
+/// Mean blur, px, at which it begins to fade into the other, and at which it has: at 11 px and noise of 5 it gained four
+/// photographs 0.07 dB, and took 0.6 dB from one other picture.
 const FADING: (f64, f64) = (7.0, 9.0);
 
 /// Mean blur, px, below which that rises no more: it leaves texture where the noise is measured, which reads too high.

@@ -20,7 +20,7 @@ use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 use crate::tasks::{cut, runs};
 
-/// Longest path, px, that counts as short: beyond, the gain at noise of a grey level is below .2 dB.
+/// Longest path, px, that counts as short: at 7 px the gain is 1.6 dB without noise, 0.4 dB at noise of a grey level.
 const LONGEST: f32 = 8.0;
 
 /// Least share of the moving pixels.

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! with beta the cubic B-spline, of support 4, and t_n, w_n Gauss and Legendre's nodes and weights on [-1/2, 1/2].
-//! A path of length L turns a wave's phase by w L, and n nodes integrate that to 2 % while w L < 4 n - 8: [`nodes_for`]
-//! is enough for w <= 2.6 rad/px along paths of up to 8 px.
+//! A path of length L turns a wave's phase by w L: the nodes of [`nodes_for`] integrate that to 0.02 of the wave for
+//! w <= 2.6 rad/px along paths of up to 8 px.
 //!
 //! Units: px. Pixels whose nodes fall into different cells of the grid share a stencil that holds the taps of all.
 //! References: M. Unser, A. Aldroubi, M. Eden, IEEE Trans. Signal Processing 41 (1993) 821-833,
