@@ -10,7 +10,8 @@
 //! picture: with the noise of 8 bits alone it took 5.5 dB from photographs blurred by 3 px, and 1.6 dB at 7 px.
 //!
 //! Units: px. Validity: paths of up to [`LONGEST`]; a padding that holds all that is read. A stencil costs two to three
-//! times what lines cost, so paths are short only where at least [`LEAST_SHARE`] of all that move are.
+//! times what lines cost where neighbours move alike, and some eight times where each has a stencil of its own. So paths
+//! are short only where at least [`LEAST_SHARE`] of all that move are, and up to [`LONGEST_OF_ITS_OWN`] where they differ.
 
 use super::bands::{Bands, each};
 use super::lanes::{LANES, Lanes};
@@ -23,8 +24,11 @@ use crate::tasks::{cut, runs};
 /// Longest path, px, that counts as short: at 7 px the gain is 1.6 dB without noise, 0.4 dB at noise of a grey level.
 const LONGEST: f32 = 8.0;
 
+/// The same where pixels move otherwise than their neighbours, so that each needs a stencil of its own.
+const LONGEST_OF_ITS_OWN: f32 = 4.0;
+
 /// Least share of the moving pixels.
-const LEAST_SHARE: f64 = 0.25;
+const LEAST_SHARE: f64 = 0.75;
 
 /// Motion, px, below which a pixel without an offset is still.
 const LEAST_MOTION: f32 = 0.02;
@@ -63,6 +67,7 @@ impl ShortPaths {
         let mut planes: Vec<Vec<f32>> = both(&paths.velocity).into();
         planes.extend(both(&paths.curvature));
         planes.extend(paths.offset.iter().flat_map(both));
+        let limit = if neighbours_agree(&planes, width) { LONGEST } else { LONGEST_OF_ITS_OWN };
         let mut own = vec![0.0; height * width];
         let (mut longest, mut farthest, mut count, mut moving) = (0.0f32, 0.0f32, 0, 0);
         for (i, own) in own.iter_mut().enumerate() {
@@ -71,7 +76,7 @@ impl ShortPaths {
             // Unknown motion compares to nothing.
             let moves = length >= LEAST_MOTION || (length >= 0.0 && (at(4) != 0.0 || at(5) != 0.0));
             moving += usize::from(moves);
-            if moves && length <= LONGEST {
+            if moves && length <= limit {
                 *own = 1.0;
                 count += 1;
                 longest = longest.max(length);
@@ -204,6 +209,14 @@ impl ShortPaths {
         }
         paths
     }
+}
+
+/// Whether most pixels have the path of the one to their left, bit for bit.
+fn neighbours_agree(planes: &[Vec<f32>], width: usize) -> bool {
+    let count = planes[0].len();
+    let agrees = |i: usize| planes.iter().all(|plane| plane[i].to_bits() == plane[i - 1].to_bits());
+    let inner = (1..count).filter(|i| i % width > 0);
+    2 * inner.filter(|&i| agrees(i)).count() >= count - count / width
 }
 
 /// Writes the sums of the pixels that are short.

@@ -114,22 +114,34 @@ fn node(paths: &Paths, [time, weight]: [f32; 2]) -> Node {
         [(u, (qu, du)), (v, (qv, dv))].into_iter().enumerate()
     {
         let share = if axis == 0 { 1.0 } else { weight };
-        let mut taps = zero;
-        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        let (mut place, mut cell, mut taps) = ([0.0; LANES], [0.0; LANES], zero);
         for i in 0..LANES {
-            let place = offset.0[i] - time * motion.0[i] + bend * curvature.0[i];
-            let cell = place.floor();
-            let f = place - cell;
+            place[i] = offset.0[i] - time * motion.0[i] + bend * curvature.0[i];
+        }
+        for i in 0..LANES {
+            cell[i] = place[i].floor();
+        }
+        for i in 0..LANES {
+            let f = place[i] - cell[i];
             let g = 1.0 - f;
             let (f3, g3) = (share / 6.0 * f * f * f, share / 6.0 * g * g * g);
-            node.cell[axis].0[i] = cell;
             taps[0].0[i] = g3;
             taps[1].0[i] = share * (2.0 / 3.0 - f * f) + 3.0 * f3;
             taps[2].0[i] = share * (2.0 / 3.0 - g * g) + 3.0 * g3;
             taps[3].0[i] = f3;
-            least = if cell < least { cell } else { least };
-            most = if cell > most { cell } else { most };
         }
+        // By halves: a chain of comparisons would be one lane after the other.
+        let (mut low, mut high) = (cell, cell);
+        let mut half = LANES / 2;
+        while half > 0 {
+            for i in 0..half {
+                low[i] = if low[i + half] < low[i] { low[i + half] } else { low[i] };
+                high[i] = if high[i + half] > high[i] { high[i + half] } else { high[i] };
+            }
+            half /= 2;
+        }
+        let (least, most) = (low[0], high[0]);
+        node.cell[axis].0 = cell;
         (node.from[axis], node.to[axis]) = (least as i32, most as i32);
         if axis == 0 { node.across = taps } else { node.down = taps }
     }

@@ -19,7 +19,7 @@ const CAUTIOUS: Prior = Prior { rounding: 0.5, power: Power::One };
 const SHARP: Prior = Prior { rounding: 1.0, power: Power::Half };
 
 /// Where the first restoration starts.
-const START: Effort = Effort { half: (5, 12), full: (1, 12) };
+const START: Effort = Effort { half: (5, 12), full: (1, 12), taps: Taps::Cubic };
 
 /// A picture restored with growing strength of the prior: strengths and effort.
 #[derive(Debug, Clone, PartialEq)]
