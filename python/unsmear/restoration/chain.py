@@ -30,7 +30,13 @@ from unsmear.restoration.memo import Memo
 from unsmear.restoration.neighbours import Neighbours
 from unsmear.restoration.records import Alone, Restored, Settings
 from unsmear.restoration.several_frames import SeveralFrames
-from unsmear.restoration.twin_frames import Twins, choose_strength, score, twins
+from unsmear.restoration.twin_frames import (
+    Twins,
+    choose_strength,
+    of_noise,
+    score,
+    twins,
+)
 from unsmear.restoration.verdict import judge
 
 if TYPE_CHECKING:
@@ -214,6 +220,10 @@ class Chain:
             blur,
             exposure.status,
         )
+        if exposure.status == "small":
+            # Short blur dims and hides nothing: little is left to the prior to guess.
+            strength = min(strength, of_noise(exposure.noise, WALK))
+            single, pad, sharp = self._single(index, strength)
         report |= {
             "regularization": strength / self._source.scale,
             "sharp": sharp,

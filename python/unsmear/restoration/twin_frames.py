@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Plane = NDArray[np.float32]
     Field = NDArray[np.float32]
 
-__all__ = ["Twins", "choose_strength", "errors", "score", "twins"]
+__all__ = ["Twins", "choose_strength", "errors", "of_noise", "score", "twins"]
 
 GREATEST_ERROR = 30.0
 LEAST_BLUR = 0.7
@@ -118,3 +118,8 @@ def choose_strength(
     share = (before - limit) / (before - at)
     step = math.log(strengths[first] / strengths[first - 1])
     return max(strengths[first - 1] * math.exp(share * step), floor)
+
+
+def of_noise(noise: float, strengths: tuple[float, ...]) -> float:
+    """Return the strength that the noise alone asks for, not below the least tried."""
+    return max(2 * LEAST_STRENGTH * math.sqrt(noise) ** 3, strengths[0])
