@@ -234,7 +234,8 @@ mod tests {
         let scenes = SceneSpectra::new(&waves);
         let point = Point { weight: 1.0, velocity: [9.0, 4.0], curvature: [1.0, 2.0] };
         let (velocity, power) = ([9.0, 4.0], vec![0.0; waves.len()]);
-        let mut tile = Tile { velocity, speed: 97f64.sqrt(), points: vec![point], power };
+        let mut tile =
+            Tile { velocity, speed: 97f64.sqrt(), points: vec![point], power, contrast: 1.0 };
         let leakage = Leakage::new(&tile, &waves);
         let mut pass = vec![0.0; waves.len()];
         power_passed(&tile, &waves, &leakage, &table, 0.8, &mut pass);

@@ -1,11 +1,9 @@
 //! The search over the scale of the blur: a coarse grid, the tiles long enough at its optimum, a fine grid.
 
-use rayon::prelude::*;
-
-use super::likelihood::{SHAPES, SceneSpectra, curves};
-use super::path_spectrum::PathSpectrum;
+use super::likelihood::SHAPES;
 use super::random::Random;
 use super::tile::{Tile, Waves};
+use super::tile_likelihoods::TileLikelihoods;
 use super::vote::{Optimum, optimum, spread};
 use crate::control::Control;
 use crate::error::Result;
@@ -14,7 +12,7 @@ use crate::error::Result;
 pub(super) const LEAST_BLUR: f64 = 2.4;
 
 /// Longest blur that a tile shows, as a share of its side.
-const LONGEST_BLUR: f64 = 0.75;
+pub(super) const LONGEST_BLUR: f64 = 0.75;
 
 /// Step of the first grid in log s, and of the finer one.
 const STEPS: [f64; 2] = [0.095, 0.02];
@@ -24,9 +22,6 @@ const FINE: i32 = 6;
 
 /// Rounds of leaving out tiles too short at the s found.
 const GATES: usize = 4;
-
-/// Greatest frequency of the likelihood, rad/px, for the extent of the table.
-const GREATEST_FREQUENCY: f64 = 2.8;
 
 /// What the tiles say.
 pub(super) struct Found {
@@ -59,10 +54,8 @@ pub(super) fn search(
     random: &mut Random,
     control: &Control,
 ) -> Result<Evidence> {
-    let likelihoods = Likelihoods::new(tiles, waves, range.1, noise, control)?;
-    let (first, octaves) = (range.0.ln(), (range.1 / range.0).ln());
-    let steps = (octaves / STEPS[0]).ceil();
-    let grid: Vec<f64> = (0..=steps as usize).map(|i| first + i as f64 / steps * octaves).collect();
+    let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
+    let grid = first_grid(range);
     let all = likelihoods.curves(&grid)?;
     let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else {
         let whole = optimum(all.iter().map(Vec::as_slice), &grid);
@@ -82,42 +75,11 @@ pub(super) fn search(
     Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
 }
 
-/// Likelihoods of the tiles on any grid.
-struct Likelihoods<'a> {
-    tiles: &'a [Tile],
-    waves: &'a Waves,
-    scenes: SceneSpectra,
-    table: PathSpectrum,
-    noise: f64,
-    control: &'a Control,
-}
-
-impl<'a> Likelihoods<'a> {
-    fn new(
-        tiles: &'a [Tile],
-        waves: &'a Waves,
-        most_scale: f64,
-        noise: f64,
-        control: &'a Control,
-    ) -> Result<Self> {
-        control.check()?;
-        let points = tiles.iter().flat_map(|tile| &tile.points);
-        let greatest =
-            points.map(|p| f64::from(p.curvature[0].hypot(p.curvature[1]))).fold(0.0, f64::max);
-        let table = PathSpectrum::new(greatest * most_scale.powi(2) * GREATEST_FREQUENCY);
-        let scenes = SceneSpectra::new(waves);
-        Ok(Self { tiles, waves, scenes, table, noise, control })
-    }
-
-    fn curves(&self, log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
-        let scales: Vec<f64> = log_scales.iter().map(|s| s.exp()).collect();
-        self.control.expect(self.tiles.len());
-        let of_tile = |tile: &Tile| {
-            self.control.advance()?;
-            Ok(curves(tile, self.waves, &self.scenes, &self.table, &scales, self.noise))
-        };
-        self.tiles.par_iter().map(of_tile).collect()
-    }
+/// Logarithms of scales over all of `range`.
+pub(super) fn first_grid(range: (f64, f64)) -> Vec<f64> {
+    let (first, length) = (range.0.ln(), (range.1 / range.0).ln());
+    let steps = (length / STEPS[0]).ceil();
+    (0..=steps as usize).map(|i| first + i as f64 / steps * length).collect()
 }
 
 /// The optimum of the tiles long enough at it, and which these are; None when there are none.

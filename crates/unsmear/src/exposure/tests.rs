@@ -38,7 +38,9 @@ fn found(image: &Array2<f64>, flow: &FlowField<f64>, range: (f64, f64)) -> Expos
     let still = constant(0.0, 0.0);
     let frame =
         ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
-    ExposureSearch { range, noise: None, seed: 1 }.estimate(&[frame], &Control::new()).unwrap()
+    ExposureSearch { range, noise: None, seed: 1, turn: false }
+        .estimate(&[frame], &Control::new())
+        .unwrap()
 }
 
 #[test]
@@ -85,7 +87,7 @@ fn short_blur_is_told_from_shorter() {
         let frame =
             ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
         // The picture is all texture: its noise has to be told.
-        let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1 };
+        let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1, turn: false };
         search.estimate(&[frame], &Control::new()).unwrap()
     });
     assert_eq!([open.status, half.status], [ExposureStatus::Small; 2]);
@@ -104,7 +106,7 @@ fn a_sharp_picture_is_not_found_to_be_blurred() {
     let frame =
         ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
     // The picture is all texture: its noise has to be told.
-    let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1 };
+    let search = ExposureSearch { range: (0.06, 1.25), noise: Some(0.5), seed: 1, turn: false };
     let estimate = search.estimate(&[frame], &Control::new()).unwrap();
     // 2.4 px, where the first zero leaves the band, is all that can be told.
     assert!(estimate.value * 20.0 < 2.4, "{estimate:?}");
@@ -113,7 +115,7 @@ fn a_sharp_picture_is_not_found_to_be_blurred() {
 #[test]
 fn names_what_is_wrong() {
     let frames: [ExposureFrame<'_, f64>; 0] = [];
-    let search = ExposureSearch { range: (0.4, 1.25), noise: None, seed: 0 };
+    let search = ExposureSearch { range: (0.4, 1.25), noise: None, seed: 0, turn: false };
     assert!(search.estimate(&frames, &Control::new()).is_err());
     let (image, flow) = (Array2::zeros(SHAPE), constant(1.0, 1.0));
     let frame =

@@ -26,7 +26,7 @@ const GREATEST_SPREAD: f64 = 0.35;
 const GREATEST_UNKNOWN: f64 = 0.1;
 
 /// Least mean power of a tile in units of the noise's: below it the spectrum shows the noise.
-const LEAST_POWER: f64 = 20.0;
+const LEAST_POWER: f64 = 5.0;
 
 /// Points per axis: the three-point Gauss rule for a bell of the window's variance, (0.141 T)^2.
 const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1.0 / 6.0)];
@@ -89,6 +89,8 @@ pub(super) struct Tile {
     pub(super) points: Vec<Point>,
     /// Periodogram at the waves, in squares of the picture's units.
     pub(super) power: Vec<f64>,
+    /// Its mean in units of the noise's power.
+    pub(super) contrast: f64,
 }
 
 impl Tile {
@@ -109,8 +111,8 @@ impl Tile {
             return None;
         }
         let power = periodogram(&frame.image.slice(part), waves, plan)?;
-        let mean = power.iter().sum::<f64>() / power.len() as f64;
-        if !(mean > LEAST_POWER * noise * noise) {
+        let contrast = power.iter().sum::<f64>() / power.len() as f64 / (noise * noise);
+        if !(contrast > LEAST_POWER) {
             return None;
         }
         let curves = [&frame.curvature.u, &frame.curvature.v].map(|field| field.slice(part));
@@ -133,7 +135,25 @@ impl Tile {
                 });
             }
         }
-        Some(Self { velocity: [u, v], speed, points, power })
+        Some(Self { velocity: [u, v], speed, points, power, contrast })
+    }
+
+    /// The same picture under a motion turned from right to down by `angle`, rad.
+    pub(super) fn turned(&self, angle: f64) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        let turn = |[u, v]: [f64; 2]| [cos * u - sin * v, sin * u + cos * v];
+        let single = |part: [f32; 2]| turn(part.map(f64::from)).map(|part| part as f32);
+        let points = self.points.iter().map(|point| Point {
+            weight: point.weight,
+            velocity: single(point.velocity),
+            curvature: single(point.curvature),
+        });
+        Self {
+            velocity: turn(self.velocity),
+            points: points.collect(),
+            power: self.power.clone(),
+            ..*self
+        }
     }
 }
 
