@@ -1,48 +1,45 @@
 //! How far the flow points beside the blur.
 //!
-//! A motion turned by t moves the dark lines of the spectrum with it, so that Whittle's likelihood (`likelihood.rs`)
-//! tells directions as it tells lengths; t is one for the whole picture, as of a compass that was read wrongly. Some tiles
-//! are asked over a coarse grid of t and all scales, and only when another t than 0 wins, more of them over a fine grid
-//! around it. On photographs blurred by 3 to 22 px the fine grid finds t within half a degree to two, less where blur is
-//! short and noise strong.
+//! A motion turned by t turns the dark lines of the spectrum with it, so that Whittle's likelihood (`likelihood.rs`) tells
+//! directions as it tells lengths; t is one for the whole picture, as of a flow from another camera or a compass. Some
+//! tiles are asked over a coarse grid of t and all scales, and only where another t than 0 wins, more of them over a fine
+//! grid around it. On photographs blurred by 7 to 22 px t comes out within half a degree, within 1.5 where noise is
+//! strong.
 //!
-//! A turn is believed if it is clear of 0 by [`CLEAR`] deviations over resamplings of the tiles and by [`LEAST_TURN`],
-//! within the range looked at and told by enough tiles. Texture that has a direction of its own moves the optimum by a
-//! few degrees, not more: dark lines do not follow it.
-
-use std::f64::consts::PI;
+//! A turn is believed if it is clear of 0 by [`LEAST_TURN`] and by [`CLEAR`] deviations over resamplings of the tiles, if
+//! shapes of the scene's spectrum agree, and if neither it nor the scale with it lies at an end of its range.
 
 use super::likelihood::SHAPES;
 use super::random::Random;
-use super::search::LONGEST_BLUR;
+use super::search::{LEAST_BLUR, LONGEST_BLUR};
 use super::tile::{Tile, Waves};
 use super::tile_likelihoods::TileLikelihoods;
 use crate::control::Control;
 use crate::error::Result;
 
-/// One degree, rad.
-const DEGREE: f64 = PI / 180.0;
-
-/// Turns first tried, degrees: the optimum is some 12 wide to either side at a blur of 22 px.
+/// Turns first tried, degrees: at a blur of 22 px the optimum is some 12 wide, at shorter ones wider.
 const COARSE: [f64; 5] = [0.0, -6.0, 6.0, -12.0, 12.0];
 
 /// Step of the fine grid, degrees, and the steps to either side.
 const FINE: (f64, i32) = (2.0, 4);
 
-/// Scales to either side of the best of the first grid that the fine one looks at.
-const NEAR_SCALES: usize = 2;
+/// Scales that the fine grid looks at, to either side of the best.
+const NEAR: usize = 2;
 
-/// Tiles of the coarse grid and of the fine one.
+/// Tiles asked first and then.
 const TILES: (usize, usize) = (16, 40);
 
 /// Fewest tiles that are believed.
 const LEAST_TILES: usize = 8;
 
-/// Least turn that is believed, degrees.
-const LEAST_TURN: f64 = 4.0;
+/// Least turn that is believed, degrees: lines that many things in the picture have in common feign up to 4.
+const LEAST_TURN: f64 = 5.0;
 
-/// Deviations that it must be away from 0.
+/// Deviations that a turn must be away from 0.
 const CLEAR: f64 = 3.0;
+
+/// Distance from the winner within which a shape of the scene's spectrum agrees, degrees, and the share that must.
+const AGREEMENT: (f64, f64) = (3.0, 0.6);
 
 /// Resamplings of the tiles.
 const RESAMPLINGS: usize = 30;
@@ -50,79 +47,138 @@ const RESAMPLINGS: usize = 30;
 /// Deviations of a normal distribution that its middle 80 % span.
 const MIDDLE_DEVIATIONS: f64 = 2.563;
 
-/// The turn, rad from right to down, that puts the motion of `tiles` along their blur; 0 unless there is one for sure.
-pub(super) fn turn(
-    tiles: &[Tile],
-    waves: &Waves,
-    log_scales: &[f64],
-    noise: f64,
-    random: &mut Random,
-    control: &Control,
-) -> Result<f64> {
-    let most = log_scales[log_scales.len() - 1].exp();
-    let ask = |tiles: &[&Tile], turns: &[f64], grid: &[f64]| -> Result<Vec<Vec<Vec<f64>>>> {
-        let of_turn = |&turn: &f64| {
-            let turned: Vec<Tile> = tiles.iter().map(|t| t.turned(turn * DEGREE)).collect();
-            TileLikelihoods::new(&turned, waves, most, noise, control)?.curves(grid)
-        };
-        turns.iter().map(of_turn).collect()
-    };
-    let fits = |tile: &&Tile| tile.speed * most.min(1.0) < LONGEST_BLUR * waves.side as f64;
-    let mut chosen: Vec<&Tile> = tiles.iter().filter(fits).take(TILES.1).collect();
-    let first = &chosen[..chosen.len().min(TILES.0)];
-    if first.len() < LEAST_TILES {
-        return Ok(0.0);
-    }
-    let all = ask(first, &COARSE, log_scales)?;
-    let every: Vec<usize> = (0..first.len()).collect();
-    let least: Vec<(f64, usize)> = all.iter().map(|t| least(t, &every, log_scales.len())).collect();
-    let best = (0..COARSE.len()).fold(0, |b, i| if least[i].0 < least[b].0 { i } else { b });
-    if best == 0 {
-        return Ok(0.0);
-    }
-    let at = least[best].1;
-    let near =
-        &log_scales[at.saturating_sub(NEAR_SCALES)..log_scales.len().min(at + NEAR_SCALES + 1)];
-    let turns: Vec<f64> =
-        (-FINE.1..=FINE.1).map(|i| COARSE[best] + FINE.0 * f64::from(i)).collect();
-    chosen.retain(|tile| tile.speed * near[near.len() / 2].exp() > super::search::LEAST_BLUR);
-    if chosen.len() < LEAST_TILES {
-        return Ok(0.0);
-    }
-    let all = ask(&chosen, &turns, near)?;
-    let optimum = |drawn: &[usize]| {
-        let values: Vec<f64> =
-            all.iter().map(|turn| self::least(turn, drawn, near.len()).0).collect();
-        parabola(&values, &turns)
-    };
-    let every: Vec<usize> = (0..chosen.len()).collect();
-    let Some(found) = optimum(&every) else { return Ok(0.0) };
-    let mut redrawn: Vec<f64> = (0..RESAMPLINGS)
-        .map(|_| {
-            let drawn: Vec<usize> = every.iter().map(|_| random.below(every.len())).collect();
-            optimum(&drawn).unwrap_or(0.0)
-        })
-        .collect();
-    redrawn.sort_unstable_by(f64::total_cmp);
-    let tenth = RESAMPLINGS / 10;
-    let spread = (redrawn[RESAMPLINGS - 1 - tenth] - redrawn[tenth]) / MIDDLE_DEVIATIONS;
-    let clear = found.abs() >= LEAST_TURN.max(CLEAR * spread);
-    Ok(if clear { found * DEGREE } else { 0.0 })
+/// Who is asked about turns, and how.
+pub(super) struct TurnSearch<'a> {
+    pub(super) tiles: &'a [Tile],
+    pub(super) waves: &'a Waves,
+    /// Logarithms of the scales, ascending.
+    pub(super) log_scales: &'a [f64],
+    /// Deviation of the noise.
+    pub(super) noise: f64,
 }
 
-/// Least -log L of the tiles `drawn` over shapes and scales, and the scale it is at.
-fn least(tiles: &[Vec<f64>], drawn: &[usize], scales: usize) -> (f64, usize) {
-    let mut sum = vec![0.0; SHAPES * scales];
-    for &tile in drawn {
-        sum.iter_mut().zip(&tiles[tile]).for_each(|(sum, value)| *sum += value);
+impl TurnSearch<'_> {
+    /// The turn, rad from right to down, that puts the motion of the tiles along their blur; 0 unless one is clear.
+    pub(super) fn find(&self, random: &mut Random, control: &Control) -> Result<f64> {
+        let longest = self.log_scales[self.log_scales.len() - 1].exp().min(1.0);
+        let fits = |tile: &&Tile| tile.speed * longest < LONGEST_BLUR * self.waves.side as f64;
+        let mut tiles: Vec<&Tile> = self.tiles.iter().filter(fits).take(TILES.1).collect();
+        if tiles.len() < LEAST_TILES {
+            return Ok(0.0);
+        }
+        let some = &tiles[..tiles.len().min(TILES.0)];
+        let coarse = self.ask(some, &COARSE, self.log_scales, control)?;
+        let every: Vec<usize> = (0..some.len()).collect();
+        let (turn, scale) = coarse.best(&every);
+        if COARSE[turn] == 0.0 || scale == 0 || scale + 1 == self.log_scales.len() {
+            return Ok(0.0);
+        }
+        let near = scale.saturating_sub(NEAR)..(scale + NEAR + 1).min(self.log_scales.len());
+        tiles.retain(|tile| tile.speed * self.log_scales[scale].exp() > LEAST_BLUR);
+        let around = |i: i32| COARSE[turn] + FINE.0 * f64::from(i);
+        let turns: Vec<f64> = (-FINE.1..=FINE.1).map(around).collect();
+        let fine = self.ask(&tiles, &turns, &self.log_scales[near], control)?;
+        Ok(fine.believed(&turns, random).to_radians())
     }
-    let at = (0..sum.len()).fold(0, |at, i| if sum[i] < sum[at] { i } else { at });
-    (sum[at], at % scales)
+
+    fn ask(
+        &self,
+        tiles: &[&Tile],
+        turns: &[f64],
+        log_scales: &[f64],
+        control: &Control,
+    ) -> Result<Turned> {
+        let most = log_scales[log_scales.len() - 1].exp();
+        let curves = turns.iter().map(|turn| {
+            let turned: Vec<Tile> = tiles.iter().map(|t| t.turned(turn.to_radians())).collect();
+            TileLikelihoods::new(&turned, self.waves, most, self.noise, control)?.curves(log_scales)
+        });
+        Ok(Turned { curves: curves.collect::<Result<_>>()?, scales: log_scales.len() })
+    }
+}
+
+/// -log L by turn, tile, shape (outer) and scale (inner).
+struct Turned {
+    curves: Vec<Vec<Vec<f64>>>,
+    scales: usize,
+}
+
+impl Turned {
+    /// Numbers of the likeliest turn and scale of the tiles `drawn`.
+    fn best(&self, drawn: &[usize]) -> (usize, usize) {
+        let leasts: Vec<(f64, usize)> = (0..self.curves.len())
+            .map(|turn| {
+                let sum = self.sum(turn, drawn);
+                let at = least(&sum);
+                (sum[at], at % self.scales)
+            })
+            .collect();
+        let values: Vec<f64> = leasts.iter().map(|least| least.0).collect();
+        let turn = least(&values);
+        (turn, leasts[turn].1)
+    }
+
+    /// The turn in degrees, or 0 if it is not to be believed.
+    fn believed(&self, turns: &[f64], random: &mut Random) -> f64 {
+        let tiles = self.curves[0].len();
+        if tiles < LEAST_TILES {
+            return 0.0;
+        }
+        let every: Vec<usize> = (0..tiles).collect();
+        let of_shapes = self.profiles(&every);
+        let Some(found) = parabola(&lowest(&of_shapes), turns) else { return 0.0 };
+        let agree = |profile: &&Vec<f64>| {
+            parabola(profile, turns).is_some_and(|own| (own - found).abs() <= AGREEMENT.0)
+        };
+        let vote = of_shapes.iter().filter(agree).count() as f64 / SHAPES as f64;
+        let mut redrawn: Vec<f64> = (0..RESAMPLINGS)
+            .map(|_| {
+                let drawn: Vec<usize> = every.iter().map(|_| random.below(tiles)).collect();
+                parabola(&lowest(&self.profiles(&drawn)), turns).unwrap_or(0.0)
+            })
+            .collect();
+        redrawn.sort_unstable_by(f64::total_cmp);
+        let tenth = RESAMPLINGS / 10;
+        let spread = (redrawn[RESAMPLINGS - 1 - tenth] - redrawn[tenth]) / MIDDLE_DEVIATIONS;
+        let clear = found.abs() >= LEAST_TURN.max(CLEAR * spread) && vote >= AGREEMENT.1;
+        if clear { found } else { 0.0 }
+    }
+
+    /// Least -log L over the scales, by shape and turn.
+    fn profiles(&self, drawn: &[usize]) -> Vec<Vec<f64>> {
+        let mut profiles = vec![Vec::with_capacity(self.curves.len()); SHAPES];
+        for turn in 0..self.curves.len() {
+            let sum = self.sum(turn, drawn);
+            for (profile, curve) in profiles.iter_mut().zip(sum.chunks(self.scales)) {
+                profile.push(curve[least(curve)]);
+            }
+        }
+        profiles
+    }
+
+    fn sum(&self, turn: usize, drawn: &[usize]) -> Vec<f64> {
+        let mut sum = vec![0.0; SHAPES * self.scales];
+        for &tile in drawn {
+            let curves = &self.curves[turn][tile];
+            sum.iter_mut().zip(curves).for_each(|(sum, value)| *sum += value);
+        }
+        sum
+    }
+}
+
+/// The lowest of several curves at every place.
+fn lowest(curves: &[Vec<f64>]) -> Vec<f64> {
+    let at = |i: usize| curves.iter().map(|curve| curve[i]).fold(f64::INFINITY, f64::min);
+    (0..curves[0].len()).map(at).collect()
+}
+
+fn least(values: &[f64]) -> usize {
+    (0..values.len()).fold(0, |at, i| if values[i] < values[at] { i } else { at })
 }
 
 /// Place of the least of the parabola through the least value and its neighbours, equally spaced; None at an end.
 fn parabola(values: &[f64], places: &[f64]) -> Option<f64> {
-    let at = (0..values.len()).fold(0, |at, i| if values[i] < values[at] { i } else { at });
+    let at = least(values);
     if at == 0 || at + 1 == values.len() {
         return None;
     }

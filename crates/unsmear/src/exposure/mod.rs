@@ -32,6 +32,7 @@ mod tile_choice;
 mod tile_likelihoods;
 mod vote;
 
+use self::direction::TurnSearch;
 pub use self::frame::ExposureFrame;
 use self::random::Random;
 use self::search::{Evidence, Found, LEAST_BLUR, first_grid, search};
@@ -128,8 +129,9 @@ impl ExposureSearch {
             let chosen = choose_tiles(frames, noise, slowest, &mut random, control)?;
             let Some((waves, mut tiles)) = chosen else { return Ok((0, None)) };
             if self.turn {
-                let grid = first_grid(beyond);
-                turn = direction::turn(&tiles, &waves, &grid, noise, &mut random, control)?;
+                let log_scales = &first_grid(beyond);
+                let search = TurnSearch { tiles: &tiles, waves: &waves, log_scales, noise };
+                turn = search.find(&mut random, control)?;
                 if turn != 0.0 {
                     tiles = tiles.iter().map(|tile| tile.turned(turn)).collect();
                 }
@@ -171,8 +173,9 @@ impl ExposureSearch {
         let slowest = LEAST_BLUR / self.range.1;
         match choose_tiles(frames, noise, slowest, &mut random, control)? {
             Some((waves, tiles)) => {
-                let grid = first_grid(self.range);
-                direction::turn(&tiles, &waves, &grid, noise, &mut random, control)
+                let log_scales = &first_grid(self.range);
+                let search = TurnSearch { tiles: &tiles, waves: &waves, log_scales, noise };
+                search.find(&mut random, control)
             }
             None => Ok(0.0),
         }

@@ -19,6 +19,9 @@ const LEAST_STEPS: f64 = 2.5;
 /// Greatest frequency used, rad/px: beyond it cameras, codecs and demosaicking shape the spectrum.
 const GREATEST: f64 = 2.7;
 
+/// Sectors of directions, in each of which a scene has a strength of its own.
+pub(super) const SECTORS: usize = 12;
+
 /// Greatest spread of a tile's motion, as a share of its length.
 const GREATEST_SPREAD: f64 = 0.35;
 
@@ -34,7 +37,7 @@ const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1
 /// Number of points.
 pub(super) const POINTS: usize = NODES.len() * NODES.len();
 
-/// The waves at which tiles of one size are compared: half a plane, for a picture's spectrum is symmetric.
+/// The waves at which tiles of one size are compared, by direction: half a plane, for a picture's spectrum is symmetric.
 pub(super) struct Waves {
     /// Side T of the tiles, px.
     pub(super) side: usize,
@@ -42,6 +45,8 @@ pub(super) struct Waves {
     pub(super) x: Vec<f32>,
     /// Frequency downwards, rad/px.
     pub(super) y: Vec<f32>,
+    /// Ends of the sectors of directions, in which the waves lie one after the other.
+    pub(super) sectors: Vec<usize>,
     bins: Vec<usize>,
 }
 
@@ -51,18 +56,31 @@ impl Waves {
             let signed = if k > side / 2 { k as f64 - side as f64 } else { k as f64 };
             TAU * signed / side as f64
         };
-        let mut waves = Self { side, x: Vec::new(), y: Vec::new(), bins: Vec::new() };
         let least = LEAST_STEPS * TAU / side as f64;
+        let mut of_sectors = vec![Vec::new(); SECTORS];
         for bin in 0..side * side {
             let (y, x) = (frequency(bin / side), frequency(bin % side));
             let radius = x.hypot(y);
             if radius > least && radius < GREATEST && (y > 0.0 || (y == 0.0 && x > 0.0)) {
-                waves.bins.push(bin);
-                waves.x.push(x as f32);
-                waves.y.push(y as f32);
+                // The first sector lies about the x axis: on both ends of the half plane.
+                let sector = (y.atan2(x) / PI * SECTORS as f64 + 0.5) as usize % SECTORS;
+                of_sectors[sector].push((bin, x as f32, y as f32));
             }
         }
-        waves
+        let mut end = 0;
+        let ends = of_sectors.iter().map(|sector| {
+            end += sector.len();
+            end
+        });
+        let sectors = ends.collect();
+        let waves = of_sectors.concat();
+        Self {
+            side,
+            x: waves.iter().map(|w| w.1).collect(),
+            y: waves.iter().map(|w| w.2).collect(),
+            sectors,
+            bins: waves.iter().map(|w| w.0).collect(),
+        }
     }
 
     pub(super) fn len(&self) -> usize {
