@@ -9,8 +9,8 @@ import numpy as np
 
 from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
-from unsmear._motion_used import motion_used
 from unsmear._tone import tone_of
+from unsmear.motion_found import motion_found
 from unsmear.plot import _notebook
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def deblur(
         raise ValueError(f"exposure must be finite and positive, got {exposure}")
     # The founding method takes what it is given.
     angle = None if turn == "auto" else _number(turn, "turn")
-    motion = motion_used(
+    motion = motion_found(
         image,
         flow,
         acceleration,

@@ -22,6 +22,7 @@ __all__ = ["ExposureEstimate", "estimate_exposure"]
 LIMITS_OF_IMAGE = (0.06, 2.5)
 LIMITS_OF_CLIP = (0.06, 1.25)
 LENGTHS_OF_TURN = (0.75, 1.33)
+BLUR_OF_TURN = (2.4, 200.0)  # px: with a dark line; restored at all
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,11 @@ def estimate_turn(
     As `estimate_exposure` where the length of the blur is known but for a third.
     """
     grey, fields, bend = _prepared(image, flow, acceleration, channel_axis)
+    blur = exposure * np.hypot(fields[..., 0], fields[..., 1])
+    if not (blur > BLUR_OF_TURN[0]).any():
+        return 0.0
+    usable = (blur <= BLUR_OF_TURN[1])[..., np.newaxis]
+    fields = np.where(usable, fields, np.float32(np.nan))
     limits = (LENGTHS_OF_TURN[0] * exposure, LENGTHS_OF_TURN[1] * exposure)
     scale = scale_of(np.asanyarray(image).dtype)
     deviation = None if noise is None else float(noise) / scale

@@ -54,13 +54,18 @@ pub(super) fn search(
     random: &mut Random,
     control: &Control,
 ) -> Result<Evidence> {
-    let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
     let grid = first_grid(range);
-    let all = likelihoods.curves(&grid)?;
-    let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else {
+    let first = long_enough(tiles, waves.side, grid[grid.len() - 1].min(0.0));
+    if first.is_empty() {
+        // Only how much less is seen along the motion than across it tells.
+        let waves = waves.isotropic();
+        let all = TileLikelihoods::new(tiles, &waves, range.1, noise, control)?.curves(&grid)?;
         let whole = optimum(all.iter().map(Vec::as_slice), &grid);
         return Ok(Evidence::Dimming(whole.of_shapes));
-    };
+    }
+    let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
+    let all = likelihoods.curves(&grid)?;
+    let (coarse, used) = gated(&all, tiles, waves.side, &grid, first);
     let log_scale = if coarse.inside {
         let fine: Vec<f64> =
             (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
@@ -82,33 +87,32 @@ pub(super) fn first_grid(range: (f64, f64)) -> Vec<f64> {
     (0..=steps as usize).map(|i| first + i as f64 / steps * length).collect()
 }
 
-/// The optimum of the tiles long enough at it, and which these are; None when there are none.
+/// Numbers of the tiles whose blur at a scale leaves a zero in the band and fits the tile.
+fn long_enough(tiles: &[Tile], side: usize, log_scale: f64) -> Vec<usize> {
+    let fits = |tile: &Tile| {
+        let blur = tile.speed * log_scale.exp();
+        blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
+    };
+    (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
+}
+
+/// The optimum of the tiles long enough at it, and which these are, beginning with `used`.
 fn gated(
     curves: &[Vec<f64>],
     tiles: &[Tile],
     side: usize,
     grid: &[f64],
-) -> Option<(Optimum, Vec<usize>)> {
-    let long_enough = |log_scale: f64| -> Vec<usize> {
-        let fits = |tile: &Tile| {
-            let blur = tile.speed * log_scale.exp();
-            blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
-        };
-        (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
-    };
+    mut used: Vec<usize>,
+) -> (Optimum, Vec<usize>) {
     let best = |used: &[usize]| optimum(used.iter().map(|&i| curves[i].as_slice()), grid);
-    let mut used = long_enough(grid[grid.len() - 1].min(0.0));
-    if used.is_empty() {
-        return None;
-    }
     let mut found = best(&used);
     for _ in 1..GATES {
-        let next = long_enough(found.log_scale);
+        let next = long_enough(tiles, side, found.log_scale);
         if next == used || next.is_empty() {
             break;
         }
         used = next;
         found = best(&used);
     }
-    Some((found, used))
+    (found, used)
 }

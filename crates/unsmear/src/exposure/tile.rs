@@ -38,6 +38,7 @@ const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1
 pub(super) const POINTS: usize = NODES.len() * NODES.len();
 
 /// The waves at which tiles of one size are compared, by direction: half a plane, for a picture's spectrum is symmetric.
+#[derive(Clone)]
 pub(super) struct Waves {
     /// Side T of the tiles, px.
     pub(super) side: usize,
@@ -85,6 +86,11 @@ impl Waves {
 
     pub(super) fn len(&self) -> usize {
         self.bins.len()
+    }
+
+    /// The same with one sector of all directions.
+    pub(super) fn isotropic(&self) -> Self {
+        Self { sectors: vec![self.len()], ..self.clone() }
     }
 }
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MotionUsed:
+class MotionFound:
     """Velocity and acceleration, turned where need be, and what was found of them."""
 
     flow: ArrayLike
@@ -48,7 +48,7 @@ class MotionUsed:
         return warnings
 
 
-def motion_used(
+def motion_found(
     image: ArrayLike,
     flow: ArrayLike,
     acceleration: ArrayLike | None,
@@ -57,7 +57,7 @@ def motion_used(
     turn: float | None,
     noise: float | None,
     channel_axis: int | None,
-) -> MotionUsed:
+) -> MotionFound:
     """Return the motion to restore ``image`` with; None is found in its blur."""
     told = 0.0 if turn is None else turn
     motion, bend = turned(flow, told), acceleration
@@ -69,13 +69,13 @@ def motion_used(
     if exposure is None:
         found = estimate_exposure(image, motion, turn=turn is None, **about)
         exposure, more = found.value, found.turn
-    elif turn is None:
+    elif turn is None and np.size(flow):
         more = estimate_turn(image, motion, exposure, **about)
     if more != 0:
         motion = turned(flow, more)
         if acceleration is not None:
             bend = turned(acceleration, more, "acceleration")
-    return MotionUsed(motion, bend, exposure, told + more, found, more)
+    return MotionFound(motion, bend, exposure, told + more, found, more)
 
 
 def turned(field: ArrayLike, degrees: float, argument: str = "flow") -> ArrayLike:
