@@ -12,7 +12,8 @@
 //! looks like is not known: alpha in {2, 3} (texture or edges), tau in {0, .2, .5} (lens and sampling) and m in {1, 1.5}
 //! (noise that is not white) make [`SHAPES`] nuisance shapes. The strength c is a tile's own in each of twelve sectors of
 //! directions, found by Fisher's scoring in log c: buildings have most of their power near two directions, and with one
-//! c for all, the blur found is one that explains this (blur too short for zeros leaves nothing but that to go by). What tells is how the power rises and falls along each direction.
+//! c for all, the blur found is one that explains this. What tells is how the power rises and falls along each direction;
+//! only blur too short for zeros leaves nothing to go by but how it differs between directions.
 //!
 //! The three waves, 0.8 of a bin apart along the motion, stand for the leakage of the window, which fills up zeros; each
 //! counts with the scene's power there, for the lower wave, being stronger, moves the zeros up (by 1 % of s).
