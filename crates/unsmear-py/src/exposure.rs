@@ -66,7 +66,7 @@ fn frames<'a>(
     (0..paths.len())
         .zip(paths)
         .map(|(n, paths)| ExposureFrame {
-            image: images.clone().index_axis_move(Axis(0), n),
+            image: (*images).index_axis_move(Axis(0), n),
             velocity: paths.velocity.view(),
             curvature: paths.curvature.view(),
         })

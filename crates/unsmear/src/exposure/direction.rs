@@ -146,7 +146,7 @@ impl Turned {
 
     /// Least -log L over the scales, by shape and turn.
     fn profiles(&self, drawn: &[usize]) -> Vec<Vec<f64>> {
-        let mut profiles = vec![Vec::with_capacity(self.curves.len()); SHAPES];
+        let mut profiles = vec![Vec::new(); SHAPES];
         for turn in 0..self.curves.len() {
             let sum = self.sum(turn, drawn);
             for (profile, curve) in profiles.iter_mut().zip(sum.chunks(self.scales)) {
