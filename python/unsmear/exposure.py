@@ -21,7 +21,7 @@ __all__ = ["ExposureEstimate", "estimate_exposure"]
 
 LIMITS_OF_IMAGE = (0.06, 2.5)
 LIMITS_OF_CLIP = (0.06, 1.25)
-LENGTHS_OF_TURN = (0.75, 1.33)
+LENGTHS_OF_TURN = (0.83, 1.2)
 BLUR_OF_TURN = (2.4, 200.0)  # px: with a dark line; restored at all
 
 
@@ -189,7 +189,7 @@ def estimate_turn(
 ) -> float:
     """Return the degrees, from right to down, by which a picture's blur runs beside it.
 
-    As `estimate_exposure` where the length of the blur is known but for a third.
+    As `estimate_exposure` where the length of the blur is known but for a sixth.
     """
     grey, fields, bend = _prepared(image, flow, acceleration, channel_axis)
     blur = exposure * np.hypot(fields[..., 0], fields[..., 1])

@@ -7,7 +7,8 @@
 //! strong.
 //!
 //! A turn is believed if it is clear of 0 by [`LEAST_TURN`] and by [`CLEAR`] deviations over resamplings of the tiles, if
-//! shapes of the scene's spectrum agree, and if neither it nor the scale with it lies at an end of its range.
+//! shapes of the scene's spectrum agree, if neither it nor the scale with it lies at an end of its range, and if it
+//! explains the tiles better than no blur at all.
 
 use super::likelihood::SHAPES;
 use super::random::Random;
@@ -26,8 +27,11 @@ const FINE: (f64, i32) = (2.0, 4);
 /// Scales that the fine grid looks at, to either side of the best.
 const NEAR: usize = 2;
 
+/// A scale at which nothing is blurred: a picture that fits it better has no direction.
+const SHARP: f64 = 1e-3;
+
 /// Tiles asked first and then.
-const TILES: (usize, usize) = (16, 40);
+const TILES: (usize, usize) = (12, 40);
 
 /// Fewest tiles that are believed.
 const LEAST_TILES: usize = 8;
@@ -67,33 +71,25 @@ impl TurnSearch<'_> {
             return Ok(0.0);
         }
         let some = &tiles[..tiles.len().min(TILES.0)];
-        let coarse = self.ask(some, &COARSE, self.log_scales, control)?;
+        let most = self.log_scales[self.log_scales.len() - 1].exp();
+        let (waves, noise) = (self.waves, self.noise);
+        let likelihoods = TileLikelihoods::new(self.tiles, waves, most, noise, control)?;
+        let coarse = Turned::new(some, &COARSE, self.log_scales, &likelihoods)?;
         let every: Vec<usize> = (0..some.len()).collect();
-        let (turn, scale) = coarse.best(&every);
+        let (value, turn, scale) = coarse.best(&every);
         if COARSE[turn] == 0.0 || scale == 0 || scale + 1 == self.log_scales.len() {
+            return Ok(0.0);
+        }
+        let (sharp, _, _) = Turned::new(some, &[0.0], &[SHARP.ln()], &likelihoods)?.best(&every);
+        if sharp <= value {
             return Ok(0.0);
         }
         let near = scale.saturating_sub(NEAR)..(scale + NEAR + 1).min(self.log_scales.len());
         tiles.retain(|tile| tile.speed * self.log_scales[scale].exp() > LEAST_BLUR);
         let around = |i: i32| COARSE[turn] + FINE.0 * f64::from(i);
         let turns: Vec<f64> = (-FINE.1..=FINE.1).map(around).collect();
-        let fine = self.ask(&tiles, &turns, &self.log_scales[near], control)?;
+        let fine = Turned::new(&tiles, &turns, &self.log_scales[near], &likelihoods)?;
         Ok(fine.believed(&turns, random).to_radians())
-    }
-
-    fn ask(
-        &self,
-        tiles: &[&Tile],
-        turns: &[f64],
-        log_scales: &[f64],
-        control: &Control,
-    ) -> Result<Turned> {
-        let most = log_scales[log_scales.len() - 1].exp();
-        let curves = turns.iter().map(|turn| {
-            let turned: Vec<Tile> = tiles.iter().map(|t| t.turned(turn.to_radians())).collect();
-            TileLikelihoods::new(&turned, self.waves, most, self.noise, control)?.curves(log_scales)
-        });
-        Ok(Turned { curves: curves.collect::<Result<_>>()?, scales: log_scales.len() })
     }
 }
 
@@ -104,18 +100,32 @@ struct Turned {
 }
 
 impl Turned {
-    /// Numbers of the likeliest turn and scale of the tiles `drawn`.
-    fn best(&self, drawn: &[usize]) -> (usize, usize) {
-        let leasts: Vec<(f64, usize)> = (0..self.curves.len())
-            .map(|turn| {
-                let sum = self.sum(turn, drawn);
-                let at = least(&sum);
-                (sum[at], at % self.scales)
-            })
-            .collect();
-        let values: Vec<f64> = leasts.iter().map(|least| least.0).collect();
-        let turn = least(&values);
-        (turn, leasts[turn].1)
+    fn new(
+        tiles: &[&Tile],
+        turns: &[f64],
+        log_scales: &[f64],
+        likelihoods: &TileLikelihoods<'_>,
+    ) -> Result<Self> {
+        let curves = turns.iter().map(|turn| {
+            let turned: Vec<Tile> = tiles.iter().map(|t| t.turned(turn.to_radians())).collect();
+            likelihoods.curves(&turned, log_scales)
+        });
+        Ok(Self { curves: curves.collect::<Result<_>>()?, scales: log_scales.len() })
+    }
+
+    /// Least -log L of the tiles `drawn`, and the numbers of the turn and scale it is at.
+    fn best(&self, drawn: &[usize]) -> (f64, usize, usize) {
+        let of_turn = |turn| {
+            let sum = self.sum(turn, drawn);
+            let at = least(&sum);
+            (sum[at], turn, at % self.scales)
+        };
+        let first = of_turn(0);
+        let lower = |best: (f64, usize, usize), turn| {
+            let other = of_turn(turn);
+            if other.0 < best.0 { other } else { best }
+        };
+        (1..self.curves.len()).fold(first, lower)
     }
 
     /// The turn in degrees, or 0 if it is not to be believed.

@@ -59,17 +59,18 @@ pub(super) fn search(
     if first.is_empty() {
         // Only how much less is seen along the motion than across it tells.
         let waves = waves.isotropic();
-        let all = TileLikelihoods::new(tiles, &waves, range.1, noise, control)?.curves(&grid)?;
+        let likelihoods = TileLikelihoods::new(tiles, &waves, range.1, noise, control)?;
+        let all = likelihoods.curves(tiles, &grid)?;
         let whole = optimum(all.iter().map(Vec::as_slice), &grid);
         return Ok(Evidence::Dimming(whole.of_shapes));
     }
     let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
-    let all = likelihoods.curves(&grid)?;
+    let all = likelihoods.curves(tiles, &grid)?;
     let (coarse, used) = gated(&all, tiles, waves.side, &grid, first);
     let log_scale = if coarse.inside {
         let fine: Vec<f64> =
             (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
-        let refined = likelihoods.curves(&fine)?;
+        let refined = likelihoods.curves(tiles, &fine)?;
         optimum(used.iter().map(|&i| refined[i].as_slice()), &fine).log_scale
     } else {
         coarse.log_scale

@@ -75,8 +75,8 @@ fn finds_a_turn_of_the_flow_together_with_its_length() {
             assert_eq!(estimate.status, ExposureStatus::Ok);
             assert!((estimate.value * scale - 1.0).abs() < 0.02, "{scale}: {estimate:?}");
         }
-        // The length told within a third, the direction is the same.
-        let told = ExposureSearch { range: (0.75 / scale, 1.33 / scale), ..search };
+        // The length told within a sixth, the direction is the same.
+        let told = ExposureSearch { range: (0.83 / scale, 1.2 / scale), ..search };
         let frame =
             ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
         let turn = told.turn(&[frame], &Control::new()).unwrap().to_degrees();
@@ -90,7 +90,7 @@ fn turns_need_blur_and_texture() {
     let none = |image: &Array2<f64>, flow: &FlowField<f64>| {
         let frame =
             ExposureFrame { image: image.view(), velocity: flow.view(), curvature: still.view() };
-        let search = ExposureSearch { range: (0.75, 1.33), noise: None, seed: 1, turn: true };
+        let search = ExposureSearch { range: (0.83, 1.2), noise: None, seed: 1, turn: true };
         search.turn(&[frame], &Control::new()).unwrap()
     };
     assert_eq!(none(&Array2::zeros(SHAPE), &constant(9.0, 0.0)), 0.0);

@@ -11,9 +11,8 @@ use crate::error::Result;
 /// Greatest frequency of the likelihood, rad/px, for the extent of the table.
 const GREATEST_FREQUENCY: f64 = 2.8;
 
-/// TileLikelihoods of the tiles on any grid.
+/// What the likelihoods of tiles, as they are or turned, have in common.
 pub(super) struct TileLikelihoods<'a> {
-    tiles: &'a [Tile],
     waves: &'a Waves,
     scenes: SceneSpectra,
     table: PathSpectrum,
@@ -22,8 +21,9 @@ pub(super) struct TileLikelihoods<'a> {
 }
 
 impl<'a> TileLikelihoods<'a> {
+    /// For `tiles` and scales up to `most_scale`.
     pub(super) fn new(
-        tiles: &'a [Tile],
+        tiles: &[Tile],
         waves: &'a Waves,
         most_scale: f64,
         noise: f64,
@@ -35,17 +35,17 @@ impl<'a> TileLikelihoods<'a> {
             points.map(|p| f64::from(p.curvature[0].hypot(p.curvature[1]))).fold(0.0, f64::max);
         let table = PathSpectrum::new(greatest * most_scale.powi(2) * GREATEST_FREQUENCY);
         let scenes = SceneSpectra::new(waves);
-        Ok(Self { tiles, waves, scenes, table, noise, control })
+        Ok(Self { waves, scenes, table, noise, control })
     }
 
     /// -log L of each tile for every shape (outer) and scale (inner).
-    pub(super) fn curves(&self, log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
+    pub(super) fn curves(&self, tiles: &[Tile], log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
         let scales: Vec<f64> = log_scales.iter().map(|s| s.exp()).collect();
-        self.control.expect(self.tiles.len());
+        self.control.expect(tiles.len());
         let of_tile = |tile: &Tile| {
             self.control.advance()?;
             Ok(curves(tile, self.waves, &self.scenes, &self.table, &scales, self.noise))
         };
-        self.tiles.par_iter().map(of_tile).collect()
+        tiles.par_iter().map(of_tile).collect()
     }
 }
