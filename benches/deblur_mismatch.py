@@ -3,7 +3,8 @@
     python benches/deblur_mismatch.py [--quick] [--output docs]
 
 The cases of `deblur_table`, but the velocity passed on is longer, shorter or turned,
-with the exposure told and with the one ``exposure="auto"`` finds.
+with the exposure told and with the one ``exposure="auto"`` finds; turned ones also with
+``turn=0``, which takes them as they are.
 Writes ``deblur_mismatch.md`` and ``.json``: gains in PSNR over the blurred picture, dB,
 how many results are worse than it by more than 0.2 dB, and what "auto" costs against
 the true length. Runs of some pictures or noises are joined by `join_reports`.
@@ -33,6 +34,7 @@ WRONG = {"true": (1.0, 0.0), "-15 %": (0.85, 0.0), "+15 %": (1.15, 0.0)}
 WRONG |= {"-10 deg": (1.0, -10.0), "+10 deg": (1.0, 10.0)}
 WRONG_LENGTHS = {f"x {f:g}": (f, 0.0) for f in (0.5, 0.75, 1.25, 1.5)}
 AUTO = ", auto"
+AS_IT_IS = ", turn=0"
 TOLERATED = -0.2  # dB
 WITHIN = 0.5  # dB
 # The founding method is slow and loses with the true velocity already.
@@ -70,16 +72,17 @@ def attempts(
     reports = {}
     for name, wrong in (WRONG | WRONG_LENGTHS).items():
         flow = distorted(case.velocity, *wrong)
-        exposures = {name: 1.0}
+        motions: dict[str, dict[str, Any]] = {name: {"exposure": 1.0}}
         if find:
             found = unsmear.estimate_exposure(case.blurred, flow)
-            exposures[name + AUTO], reports[name] = found.value, found.report()
-        for title, exposure in exposures.items():
+            motions[name + AUTO] = {"exposure": found.value, "turn": found.turn}
+            reports[name] = found.report()
+        if wrong[1]:
+            motions[name + AS_IT_IS] = {"exposure": 1.0, "turn": 0.0}
+        for title, motion in motions.items():
             for method in methods:
-                image = unsmear.deblur(
-                    case.blurred, flow, method=method, exposure=exposure
-                ).image
-                gains[method][title] = gain(case, image)
+                result = unsmear.deblur(case.blurred, flow, method=method, **motion)
+                gains[method][title] = gain(case, result.image)
     return gains, reports
 
 
@@ -119,7 +122,8 @@ def markdown(report: dict[str, Any]) -> str:
         "the blurred picture, the velocity passed on being longer, shorter or turned. "
         f"Pictures: {', '.join(report['pictures'])}, noise seed "
         f'{", ".join(map(str, seeds))}; no acceleration is told. "auto": the exposure '
-        "is found too, else it is told. Made by `benches/deblur_mismatch.py`.",
+        'is found too, else it is told; so is the direction, but for "turn=0". Made by '
+        "`benches/deblur_mismatch.py`.",
         "",
         *(
             f"- {case}: {synthetic.BLUR_CASES[case]}"

@@ -1,5 +1,6 @@
 """The command line as its user meets it."""
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -122,6 +123,16 @@ def test_deblur_writes_frames_that_are_sharper(clip: Path) -> None:
     assert detail[1] > 1.1 * detail[0]
     flow = ["--flow", str(clip / "truth.flo"), "--method", "thesis"]
     assert main(["deblur", str(clip / "clip"), "-o", str(clip / "old"), *flow]) == 0
+
+
+def test_the_page_names_the_digest_of_every_file(clip: Path) -> None:
+    page = clip / "page.html"
+    quick = ["--method", "wiener", "--exposure", "1", "--flow", str(clip / "truth.flo")]
+    arguments = ["deblur", str(clip / "clip"), "-o", str(clip / "out"), *quick]
+    assert main([*arguments, "--report", str(page)]) == 0
+    html = page.read_text("utf-8")
+    for path in (clip / "clip").iterdir():
+        assert hashlib.sha256(path.read_bytes()).hexdigest() in html
 
 
 @pytest.mark.parametrize(

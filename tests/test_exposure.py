@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import unsmear
+from numpy.typing import NDArray
 from unsmear import synthetic
 
 
@@ -86,6 +87,84 @@ def test_deblur_takes_the_blur_from_the_picture(clip: synthetic.Sequence) -> Non
     assert found.report["exposure_found"]["status"] == "ok"
 
 
+def turned(flow: NDArray[np.float32], degrees: float) -> NDArray[np.float32]:
+    """Return the flow turned from right to down."""
+    angle = np.deg2rad(degrees)
+    matrix = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    return np.asarray(flow @ np.asarray(matrix), np.float32)
+
+
+@pytest.mark.parametrize("degrees", [-12.0, 7.0, 10.0])
+@pytest.mark.parametrize("exposure", [0.8, "auto"])
+def test_a_flow_beside_the_blur_is_turned(
+    clip: synthetic.Sequence, degrees: float, exposure: float | str
+) -> None:
+    image, flow = clip.blurred[0], turned(clip.velocity[0], degrees)
+    right = unsmear.deblur(image, clip.velocity[0], exposure=0.8)
+    found = unsmear.deblur(image, flow, exposure=exposure)
+    assert found.report["turn"] == pytest.approx(-degrees, abs=1)
+    assert "beside the flow" in " ".join(found.report["warnings"])
+    inner = (slice(24, -24),) * 2
+    truth = clip.sharp[0][inner]
+    psnr = [unsmear.metrics.psnr(d.image[inner], truth) for d in (right, found)]
+    assert psnr[1] > psnr[0] - 0.5
+    # The report is enough to repeat it.
+    told = {name: found.report[name] for name in ("exposure", "turn")}
+    again = unsmear.deblur(image, flow, **told)
+    assert np.array_equal(again.image, found.image)
+    assert "beside the flow" not in " ".join(again.report["warnings"])
+
+
+def test_a_right_flow_is_left_as_it_came(clip: synthetic.Sequence) -> None:
+    image = clip.blurred[0]
+    for degrees in (0.0, 1.0, -2.0):
+        flow = turned(clip.velocity[0], degrees)
+        found = unsmear.deblur(image, flow, exposure=0.8)
+        told = unsmear.deblur(image, flow, exposure=0.8, turn=0)
+        assert found.report["turn"] == 0
+        assert np.array_equal(found.image, told.image)
+
+
+def test_turning_takes_velocity_and_acceleration_along() -> None:
+    picture = synthetic.texture((64, 80), seed=1)
+    right = np.full((64, 80, 2), (5.0, 0.0), np.float32)
+    faster = np.full((64, 80, 2), (1.0, 0.5), np.float32)
+    down, bent = turned(right, 90), turned(faster, 90)
+    straight = unsmear.deblur(picture, down, acceleration=bent, turn=0).image
+    by_turn = unsmear.deblur(picture, right, acceleration=faster, turn=90).image
+    # Sine and cosine of 90 degrees are right to the rounding of single precision.
+    np.testing.assert_allclose(by_turn, straight, atol=1e-4)
+
+
+def test_the_direction_is_sought_without_touching_what_came(
+    clip: synthetic.Sequence,
+) -> None:
+    flow = clip.velocity[0].copy()
+    flow[:9] = np.nan
+    flow[9:20] = 1e6
+    before = flow.copy()
+    unsmear.deblur(clip.blurred[0], flow, exposure=0.8, method="wiener")
+    np.testing.assert_array_equal(flow, before)
+
+
+def test_several_frames_are_not_turned_unless_asked(clip: synthetic.Sequence) -> None:
+    flow = np.stack([turned(field, 10) for field in clip.velocity])
+    assert unsmear.estimate_exposure(clip.blurred, flow).turn == 0
+    found = unsmear.estimate_exposure(clip.blurred, flow, turn=True)
+    assert found.turn == pytest.approx(-10, abs=1)
+    assert found.value == pytest.approx(0.8, rel=0.02)
+
+
+def test_the_founding_method_takes_the_flow_as_it_is(clip: synthetic.Sequence) -> None:
+    flow = turned(clip.velocity[0], 10)
+    made = [
+        unsmear.deblur(clip.blurred[0], flow, method="thesis", **more)
+        for more in ({}, {"turn": 0})
+    ]
+    assert np.array_equal(made[0].image, made[1].image)
+    assert made[0].report["turn"] == 0
+
+
 def test_bad_input_is_named(clip: synthetic.Sequence) -> None:
     image, flow = clip.blurred[0], clip.velocity[0]
     with pytest.raises(ValueError, match="frames must have shape"):
@@ -100,3 +179,7 @@ def test_bad_input_is_named(clip: synthetic.Sequence) -> None:
         unsmear.estimate_exposure(image, flow, seed=0.5)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="exposure must be 'auto'"):
         unsmear.deblur(image, flow, exposure="long")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="turn must be 'auto'"):
+        unsmear.deblur(image, flow, turn="left")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="turn must be finite"):
+        unsmear.deblur(image, flow, turn=np.nan)

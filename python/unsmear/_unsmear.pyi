@@ -29,6 +29,7 @@ __all__ = [
     "error_map",
     "estimate_exposure",
     "estimate_noise",
+    "estimate_turn",
     "fleet_jepson",
     "frame_motion",
     "fspecial_motion",
@@ -221,8 +222,18 @@ def estimate_exposure(
     noise: float | None,
     seed: int,
     of_content: bool = False,
+    turn: bool = False,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def estimate_turn(
+    images: _Single,
+    velocities: _Single,
+    accelerations: _Single | None,
+    limits: tuple[float, float],
+    noise: float | None,
+    seed: int,
+    progress: _Progress | None = None,
+) -> float: ...
 
 # Parts of the restoration of clips.
 

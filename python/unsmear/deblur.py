@@ -10,7 +10,7 @@ import numpy as np
 from unsmear import _deblur_methods, _unsmear
 from unsmear._channels import Channels
 from unsmear._tone import tone_of
-from unsmear.exposure import estimate_exposure
+from unsmear.motion_found import motion_found
 from unsmear.plot import _notebook
 
 if TYPE_CHECKING:
@@ -33,9 +33,10 @@ class DeblurResult:
     image : ndarray
         Like the input in shape, type and range. NaN where too little is known.
     report : dict
-        Plain data (JSON-able): ``method``, ``exposure`` (frames), ``noise`` (standard
-        deviation in the units of the input, None if not used), ``regularization`` (in
-        the units of the parameter, None if there was none or it followed the picture),
+        Plain data (JSON-able): ``method``, ``exposure`` (frames), ``turn`` (degrees by
+        which the flow was turned), ``noise`` (standard deviation in the units of the
+        input, None if not used), ``regularization`` (in the units of the parameter,
+        None if there was none or it followed the picture),
         counts of copied pixels (``unknown_pixels``, ``still_pixels``,
         ``too_long_pixels``), ``pixels``, ``version``, ``warnings`` (list of str). The
         iterative methods: ``iterations``, ``residual`` (root mean square of A x - b,
@@ -57,6 +58,7 @@ def deblur(
     flow: ArrayLike,
     *,
     exposure: float | Literal["auto"] = 1.0,
+    turn: float | Literal["auto"] = "auto",
     method: str = "tv",
     acceleration: ArrayLike | None = None,
     weights: ArrayLike | None = None,
@@ -81,6 +83,11 @@ def deblur(
         Fraction of the frame interval the shutter was open; > 0. "auto" finds it, and
         with it a common error in the length of the flow, in the blur of the picture;
         see `unsmear.estimate_exposure`.
+    turn : float or "auto", default "auto"
+        Degrees, from right to down, by which the flow is turned before it is used.
+        "auto" finds one angle for the whole picture, of 5 to 20 degrees, in its blur,
+        and leaves the flow as it is unless that is clear ("thesis" always does): a
+        flow that runs 10 degrees beside the blur costs four fifths of the gain.
     method : str, default "tv"
         "tv": total variation through the exact operator of the motion; best of these,
         or within .4 dB of "fast", in every case measured. "fast": the same with less
@@ -190,38 +197,38 @@ def deblur(
     if method not in METHODS:
         names = ", ".join(repr(name) for name in METHODS)
         raise ValueError(f"method must be one of {names}, got {method!r}")
-    found = None
-    if isinstance(exposure, str):
-        if exposure != "auto":
-            raise ValueError(f"exposure must be 'auto' or a number, got {exposure!r}")
-        found = estimate_exposure(
-            image,
-            flow,
-            acceleration=acceleration,
-            noise=noise,
-            channel_axis=channel_axis,
-        )
-        exposure = found.value
-    if not (np.isfinite(exposure) and exposure > 0):
-        raise ValueError(f"exposure must be finite and positive, got {exposure}")
-    exposure = float(exposure)
     channels = Channels(image, channel_axis)
+    channels.flow(flow)  # checks its shape
+    share = None if exposure == "auto" else _number(exposure, "exposure")
+    if share is not None and share <= 0:
+        raise ValueError(f"exposure must be finite and positive, got {exposure}")
+    # The founding method takes what it is given.
+    angle = None if turn == "auto" else _number(turn, "turn")
+    motion = motion_found(
+        image,
+        flow,
+        acceleration,
+        exposure=share,
+        turn=0.0 if angle is None and method == "thesis" else angle,
+        noise=noise,
+        channel_axis=channel_axis,
+    )
     if method == "thesis":
         r = THESIS_REGULARIZATION if regularization is None else float(regularization)
         planes, report = _deblur_methods.thesis(
-            channels, flow, exposure, degree, r, progress
+            channels, motion.flow, motion.exposure, degree, r, progress
         )
     elif method == "wiener":
         planes, report = _deblur_methods.wiener(
-            channels, flow, exposure, noise, regularization, progress
+            channels, motion.flow, motion.exposure, noise, regularization, progress
         )
     else:
         planes, report = _deblur_methods.variational(
             channels,
-            flow,
+            motion.flow,
             method,
-            exposure,
-            acceleration=acceleration,
+            motion.exposure,
+            acceleration=motion.acceleration,
             weights=weights,
             noise=noise,
             regularization=regularization,
@@ -230,17 +237,21 @@ def deblur(
         )
     report = {
         "method": method,
-        "exposure": exposure,
+        "exposure": motion.exposure,
+        "turn": motion.turn,
         **report,
         "pixels": int(np.prod(channels.array.shape[1:])),
         "version": _unsmear.__version__,
     }
-    report["warnings"] = _deblur_methods.warnings_of(report)
-    if found is not None:
-        report["exposure_found"] = found.report()
-        if found.status != "ok":
-            report["warnings"].append(
-                f"the exposure could not be found with certainty ({found.status}): "
-                f"{exposure:.2f} was assumed"
-            )
+    report["warnings"] = _deblur_methods.warnings_of(report) + motion.warnings()
+    if motion.found is not None:
+        report["exposure_found"] = motion.found.report()
     return DeblurResult(channels.restore(planes), report)
+
+
+def _number(value: float | str, argument: str) -> float:
+    if isinstance(value, str):
+        raise ValueError(f"{argument} must be 'auto' or a number, got {value!r}")
+    if not np.isfinite(value):
+        raise ValueError(f"{argument} must be finite, got {value}")
+    return float(value)

@@ -21,6 +21,8 @@ __all__ = ["ExposureEstimate", "estimate_exposure"]
 
 LIMITS_OF_IMAGE = (0.06, 2.5)
 LIMITS_OF_CLIP = (0.06, 1.25)
+LENGTHS_OF_TURN = (0.83, 1.2)
+BLUR_OF_TURN = (2.4, 200.0)  # px: with a dark line; restored at all
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,9 @@ class ExposureEstimate:
         The most likely value, trusted or not; NaN without tiles.
     noise : float
         Standard deviation of the noise used, in the units of the frames.
+    turn : float
+        Degrees, from right to down, by which ``flow`` had to be turned to run along
+        the blur; ``value`` belongs to the turned flow. 0 unless one is clear.
     """
 
     value: float
@@ -56,6 +61,7 @@ class ExposureEstimate:
     tiles: int
     likeliest: float
     noise: float
+    turn: float = 0.0
 
     def report(self) -> dict[str, Any]:
         """Return the attributes as plain data; NaN becomes None."""
@@ -72,6 +78,7 @@ def estimate_exposure(
     acceleration: ArrayLike | None = None,
     noise: float | None = None,
     limits: tuple[float, float] | None = None,
+    turn: bool | None = None,
     seed: int = 0,
     channel_axis: int | None = None,
     progress: Progress | None = None,
@@ -97,6 +104,10 @@ def estimate_exposure(
         frames, since a shutter closes before the next frame, with some error of the
         flow allowed; to 2.5 for one picture, whose flow may be in other units. A least
         one far from 0 makes a sharp picture find a blur that fits it by chance.
+    turn : bool, optional
+        Whether ``flow`` may run beside the blur, by one angle of up to 20 degrees for
+        the whole picture, as when it was made with another axis. Default: for one
+        picture, not for several frames, whose flow is measured in them.
     seed : int, default 0
         Of the random choice of tiles; the same seed gives the same result.
     channel_axis : int, optional
@@ -143,6 +154,62 @@ def estimate_exposure(
     >>> found.status, round(found.value, 1)
     ('ok', 0.7)
     """
+    grey, fields, bend = _prepared(frames, flow, acceleration, channel_axis)
+    count = len(fields)
+    if limits is None:
+        limits = LIMITS_OF_IMAGE if count == 1 else LIMITS_OF_CLIP
+    try:
+        seed = operator.index(seed)
+    except TypeError:
+        msg = f"seed must be an integer, got {type(seed).__name__} {seed!r}"
+        raise TypeError(msg) from None
+    scale = scale_of(np.asanyarray(frames).dtype)
+    found = _unsmear.estimate_exposure(
+        grey,
+        fields,
+        bend,
+        (float(limits[0]), float(limits[1])),
+        None if noise is None else float(noise) / scale,
+        seed % 2**64,
+        turn=count == 1 if turn is None else bool(turn),
+        progress=of_steps(progress),
+    )
+    found["noise"] *= scale
+    return ExposureEstimate(**found)
+
+
+def estimate_turn(
+    image: ArrayLike,
+    flow: ArrayLike,
+    exposure: float,
+    *,
+    acceleration: ArrayLike | None = None,
+    noise: float | None = None,
+    channel_axis: int | None = None,
+) -> float:
+    """Return the degrees, from right to down, by which a picture's blur runs beside it.
+
+    As `estimate_exposure` where the length of the blur is known but for a sixth.
+    """
+    grey, fields, bend = _prepared(image, flow, acceleration, channel_axis)
+    blur = exposure * np.hypot(fields[..., 0], fields[..., 1])
+    if not (blur > BLUR_OF_TURN[0]).any():
+        return 0.0
+    usable = (blur <= BLUR_OF_TURN[1])[..., np.newaxis]
+    fields = np.where(usable, fields, np.float32(np.nan))
+    limits = (LENGTHS_OF_TURN[0] * exposure, LENGTHS_OF_TURN[1] * exposure)
+    scale = scale_of(np.asanyarray(image).dtype)
+    deviation = None if noise is None else float(noise) / scale
+    return _unsmear.estimate_turn(grey, fields, bend, limits, deviation, 0)
+
+
+def _prepared(
+    frames: ArrayLike,
+    flow: ArrayLike,
+    acceleration: ArrayLike | None,
+    channel_axis: int | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None]:
+    """Return grey pictures (N, H, W), their velocities and accelerations."""
     fields = _fields(flow, "flow")
     count = 1 if np.ndim(flow) == 3 else len(fields)
     grey = _frames(frames, channel_axis, single=np.ndim(flow) == 3)
@@ -159,25 +226,7 @@ def estimate_exposure(
                 f"got {bend.shape}"
             )
             raise ValueError(msg)
-    if limits is None:
-        limits = LIMITS_OF_IMAGE if count == 1 else LIMITS_OF_CLIP
-    try:
-        seed = operator.index(seed)
-    except TypeError:
-        msg = f"seed must be an integer, got {type(seed).__name__} {seed!r}"
-        raise TypeError(msg) from None
-    scale = scale_of(np.asanyarray(frames).dtype)
-    found = _unsmear.estimate_exposure(
-        grey,
-        fields,
-        bend,
-        (float(limits[0]), float(limits[1])),
-        None if noise is None else float(noise) / scale,
-        seed % 2**64,
-        progress=of_steps(progress),
-    )
-    found["noise"] *= scale
-    return ExposureEstimate(**found)
+    return grey, fields, bend
 
 
 def _fields(field: ArrayLike, argument: str) -> NDArray[np.float32]:

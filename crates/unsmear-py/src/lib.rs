@@ -37,7 +37,7 @@ mod _unsmear {
     #[pymodule_export]
     use crate::deblur::{blur_f32, blur_f64, thesis_deblur, wiener_f32, wiener_f64};
     #[pymodule_export]
-    use crate::exposure::estimate_exposure;
+    use crate::exposure::{estimate_exposure, estimate_turn};
     #[pymodule_export]
     use crate::flow::{fleet_jepson, least_squares};
     #[pymodule_export]

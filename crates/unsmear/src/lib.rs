@@ -40,9 +40,10 @@
 //! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random`, `exposure::short_blur` | parts of the search for the exposure |
 //! | 13 | `exposure::tile` | |
 //! | 14 | `exposure::tile_choice`, `exposure::likelihood` | |
-//! | 15 | `exposure::vote` | |
+//! | 15 | `exposure::vote`, `exposure::tile_likelihoods` | |
 //! | 16 | `exposure::search` | |
-//! | 17 | [`exposure`] | how long the shutter was open |
+//! | 17 | `exposure::direction` | |
+//! | 18 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
 //! | 3 | `motion_operator::lanes`, `motion_operator::bands`, `motion_operator::spline_inverse`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
 //! | 4 | `motion_operator::record`, `motion_operator::strands`, `motion_operator::stencil` | |

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from unsmear._parameters import PARAMETERS, of_pairs
 from unsmear._plain_data import plain_data
+from unsmear.frame_files import located
 
 if TYPE_CHECKING:
     import argparse
@@ -30,6 +32,16 @@ def source_of(options: argparse.Namespace) -> str | list[str]:
     """Return FRAMES; one name may be a folder, a glob, a stack or a video."""
     names: list[str] = options.frames
     return names[0] if len(names) == 1 else names
+
+
+def digests_of(options: argparse.Namespace) -> dict[str, str]:
+    """Return the SHA-256 of every file that FRAMES names, by its name."""
+    found = located(source_of(options))
+    digests = {}
+    for path in found if isinstance(found, list) else [found]:
+        with path.open("rb") as file:
+            digests[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
+    return digests
 
 
 def channel_axis_of(frames: NDArray[Any]) -> int | None:

@@ -156,7 +156,10 @@ def _write_report(options: argparse.Namespace, made: ClipResult) -> None:
             for sample in made.samples
             for text in _said_of(made.reports[sample.index])
         ],
-        parameters={"frames": plain_data(made.reports)},
+        parameters={
+            "sha256": _common.digests_of(options),
+            "frames": plain_data(made.reports),
+        },
         command=options.command,
         title="unsmear deblur",
     )

@@ -201,7 +201,7 @@ class Chain:
             "exposure_found": {
                 name: None if isinstance(item, float) and np.isnan(item) else item
                 for name, item in exposure.found.items()
-                if name != "noise"
+                if name not in ("noise", "turn")
             },
             "noise": exposure.noise / self._source.scale,
             "blur_px": float(np.nanpercentile(blur, 95)) if blur.size else 0.0,

@@ -82,6 +82,8 @@ def one_by_one(
     of `unsmear.deblur`.
     """
     colour = len(clip.shape) == 4
+    # What is measured in the frames themselves runs along their blur.
+    options |= {"turn": 0.0 if flow is None else "auto"}
     for index in range(start, len(clip)):
         velocity = flow
         if velocity is None:

@@ -10,10 +10,13 @@
 //!
 //! (P. Whittle, J. R. Stat. Soc. B 15 (1953) 125-139, doi:10.1111/j.2517-6161.1953.tb00131.x). What a scene's spectrum
 //! looks like is not known: alpha in {2, 3} (texture or edges), tau in {0, .2, .5} (lens and sampling) and m in {1, 1.5}
-//! (noise that is not white) make [`SHAPES`] nuisance shapes, each with its own best strength c, found by Fisher's
-//! scoring in log c. The three waves, 0.8 of a bin apart along the motion, stand for the leakage of the window, which
-//! fills up zeros; each counts with the scene's power there, for the lower wave, being stronger, moves the zeros up (by
-//! 1 % of s).
+//! (noise that is not white) make [`SHAPES`] nuisance shapes. The strength c is a tile's own in each of twelve sectors of
+//! directions, found by Fisher's scoring in log c: buildings have most of their power near two directions, and with one
+//! c for all, the blur found is one that explains this. What tells is how the power rises and falls along each direction;
+//! only blur too short for zeros leaves nothing to go by but how it differs between directions.
+//!
+//! The three waves, 0.8 of a bin apart along the motion, stand for the leakage of the window, which fills up zeros; each
+//! counts with the scene's power there, for the lower wave, being stronger, moves the zeros up (by 1 % of s).
 #![allow(
     clippy::inline_always,
     reason = "a helper gets its caller's vector instructions only when inlined"
@@ -24,7 +27,7 @@ use std::f64::consts::TAU;
 use multiversion::multiversion;
 
 use super::path_spectrum::PathSpectrum;
-use super::tile::{Tile, Waves};
+use super::tile::{SECTORS, Tile, Waves};
 
 /// Decays of the scene's amplitude spectrum squared.
 const ALPHA: [f64; 2] = [2.0, 3.0];
@@ -83,7 +86,7 @@ pub(super) fn curves(
     noise: f64,
 ) -> Vec<f64> {
     let mut values = vec![0.0; SHAPES * scales.len()];
-    let mut strengths = [None; SHAPES];
+    let mut strengths = vec![None; SHAPES * SECTORS];
     let leakage = Leakage::new(tile, waves);
     let mut pass = vec![0f32; waves.len()];
     let mut texture = vec![0.0; waves.len()];
@@ -95,17 +98,33 @@ pub(super) fn curves(
                 *value = g * (f64::from(k2) + LEAST_PASS);
             }
             let floor = (NOISE_FACTORS[shape % NOISE_FACTORS.len()] * noise).powi(2);
-            // The strength hardly changes from one length to the next.
-            let (start, steps) = match strengths[shape] {
-                Some(strength) => (strength, STEPS[1]),
-                None => (first_guess(&tile.power, &texture), STEPS[0]),
-            };
-            let (value, strength) = deviance(&tile.power, &texture, floor, start, steps);
-            values[shape * scales.len() + index] = value;
-            strengths[shape] = Some(strength);
+            let strengths = &mut strengths[shape * SECTORS..][..SECTORS];
+            values[shape * scales.len() + index] =
+                over_sectors(&tile.power, &texture, &waves.sectors, floor, strengths);
         }
     }
     values
+}
+
+/// Least -log L over the strengths of the sectors, from those for the length before: they hardly change.
+fn over_sectors(
+    power: &[f64],
+    texture: &[f64],
+    ends: &[usize],
+    floor: f64,
+    strengths: &mut [Option<f64>],
+) -> f64 {
+    let (mut sum, mut first) = (0.0, 0);
+    for (&end, known) in ends.iter().zip(strengths) {
+        let (power, texture) = (&power[first..end], &texture[first..end]);
+        let (start, steps) = match *known {
+            Some(strength) => (strength, STEPS[1]),
+            None => (first_guess(power, texture), STEPS[0]),
+        };
+        let (value, strength) = deviance(power, texture, floor, start, steps);
+        (sum, first, *known) = (sum + value, end, Some(strength));
+    }
+    sum
 }
 
 /// Waves that leak into each wave of a tile: their shift, and their weight times the scene's power relative to the
@@ -234,7 +253,8 @@ mod tests {
         let scenes = SceneSpectra::new(&waves);
         let point = Point { weight: 1.0, velocity: [9.0, 4.0], curvature: [1.0, 2.0] };
         let (velocity, power) = ([9.0, 4.0], vec![0.0; waves.len()]);
-        let mut tile = Tile { velocity, speed: 97f64.sqrt(), points: vec![point], power };
+        let mut tile =
+            Tile { velocity, speed: 97f64.sqrt(), points: vec![point], power, contrast: 1.0 };
         let leakage = Leakage::new(&tile, &waves);
         let mut pass = vec![0.0; waves.len()];
         power_passed(&tile, &waves, &leakage, &table, 0.8, &mut pass);

@@ -20,6 +20,7 @@
 //! Validity: noise of known deviation, in the picture's units, white in the band; blur of 2.4 to about 60 px; no
 //! strong sharpening (it fills the zeros). Units: px, frames, rad/px.
 
+mod direction;
 mod frame;
 mod likelihood;
 mod path_spectrum;
@@ -28,11 +29,13 @@ mod search;
 mod short_blur;
 mod tile;
 mod tile_choice;
+mod tile_likelihoods;
 mod vote;
 
+use self::direction::TurnSearch;
 pub use self::frame::ExposureFrame;
 use self::random::Random;
-use self::search::{Evidence, Found, LEAST_BLUR, search};
+use self::search::{Evidence, Found, LEAST_BLUR, first_grid, search};
 use self::short_blur::PRIOR;
 use self::tile_choice::choose_tiles;
 use self::vote::vote;
@@ -67,6 +70,8 @@ pub struct ExposureSearch {
     pub noise: Option<f64>,
     /// Seed of the choice of tiles and of their resampling.
     pub seed: u64,
+    /// Whether the flow may point beside the blur, by up to 20 degrees: see `direction.rs`.
+    pub turn: bool,
 }
 
 /// Whether an estimate can be relied on.
@@ -85,6 +90,8 @@ pub enum ExposureStatus {
 pub struct ExposureEstimate {
     /// Share of the frame interval.
     pub value: f64,
+    /// Angle by which the flow had to be turned, rad from right to down; 0 unless one is clear.
+    pub turn: f64,
     /// Whether to rely on it.
     pub status: ExposureStatus,
     /// Share of the shapes that agree; NaN without tiles.
@@ -117,9 +124,18 @@ impl ExposureSearch {
         if noise == 0.0 {
             return Ok(without_tiles(frames, noise));
         }
+        let mut turn = 0.0;
         let mut ask = |slowest: f64| -> Result<(usize, Option<Evidence>)> {
             let chosen = choose_tiles(frames, noise, slowest, &mut random, control)?;
-            let Some((waves, tiles)) = chosen else { return Ok((0, None)) };
+            let Some((waves, mut tiles)) = chosen else { return Ok((0, None)) };
+            if self.turn {
+                let log_scales = &first_grid(beyond);
+                let search = TurnSearch { tiles: &tiles, waves: &waves, log_scales, noise };
+                turn = search.find(&mut random, control)?;
+                if turn != 0.0 {
+                    tiles = tiles.iter().map(|tile| tile.turned(turn)).collect();
+                }
+            }
             let found = search(&tiles, &waves, beyond, noise, &mut random, control)?;
             Ok((tiles.len(), Some(found)))
         };
@@ -127,7 +143,7 @@ impl ExposureSearch {
         if answer.0 < short_blur::ENOUGH_TILES && !matches!(answer.1, Some(Evidence::Zeros(_))) {
             answer = ask(short_blur::SLOWEST)?;
         }
-        Ok(match answer {
+        let estimate = match answer {
             (_, Some(Evidence::Zeros(found))) => self.of_zeros(&found, noise),
             (tiles, Some(Evidence::Dimming(of_shapes))) => {
                 let nothing = without_tiles(frames, noise);
@@ -138,7 +154,31 @@ impl ExposureSearch {
                 ExposureEstimate { value, tiles, ..nothing }
             }
             (_, None) => without_tiles(frames, noise),
-        })
+        };
+        Ok(ExposureEstimate { turn, ..estimate })
+    }
+
+    /// The angle by which `velocity` has to be turned, rad from right to down, to point along the blur whose length is
+    /// within the range; 0 unless one is clear.
+    ///
+    /// # Errors
+    /// As [`estimate`](Self::estimate).
+    pub fn turn<T: Real>(&self, frames: &[ExposureFrame<'_, T>], control: &Control) -> Result<f64> {
+        self.validate(frames)?;
+        let mut random = Random::new(self.seed);
+        let noise = self.noise_used(frames, control)?;
+        if noise == 0.0 {
+            return Ok(0.0);
+        }
+        let slowest = LEAST_BLUR / self.range.1;
+        match choose_tiles(frames, noise, slowest, &mut random, control)? {
+            Some((waves, tiles)) => {
+                let log_scales = &first_grid(self.range);
+                let search = TurnSearch { tiles: &tiles, waves: &waves, log_scales, noise };
+                search.find(&mut random, control)
+            }
+            None => Ok(0.0),
+        }
     }
 
     /// The likeliest share where it can be relied on, else a cautious one.
@@ -152,7 +192,8 @@ impl ExposureSearch {
             let cautious = median(found.of_shapes).exp().min(MOST_UNSURE).max(self.range.0);
             (cautious, ExposureStatus::Unsure)
         };
-        ExposureEstimate { value, status, vote: agreement, spread, tiles, likeliest, noise }
+        let vote = agreement;
+        ExposureEstimate { value, turn: 0.0, status, vote, spread, tiles, likeliest, noise }
     }
 
     fn validate<T: Real>(&self, frames: &[ExposureFrame<'_, T>]) -> Result<()> {
@@ -206,7 +247,8 @@ fn without_tiles<T: Real>(frames: &[ExposureFrame<'_, T>], noise: f64) -> Exposu
     let small = slow * 20 >= all * 19;
     let status = if small { ExposureStatus::Small } else { ExposureStatus::Unsure };
     let (vote, spread, likeliest) = (f64::NAN, f64::NAN, f64::NAN);
-    ExposureEstimate { value: PRIOR, status, vote, spread, tiles: 0, likeliest, noise }
+    let value = PRIOR;
+    ExposureEstimate { value, turn: 0.0, status, vote, spread, tiles: 0, likeliest, noise }
 }
 
 fn median(values: impl Into<Vec<f64>>) -> f64 {

@@ -1,11 +1,9 @@
 //! The search over the scale of the blur: a coarse grid, the tiles long enough at its optimum, a fine grid.
 
-use rayon::prelude::*;
-
-use super::likelihood::{SHAPES, SceneSpectra, curves};
-use super::path_spectrum::PathSpectrum;
+use super::likelihood::SHAPES;
 use super::random::Random;
 use super::tile::{Tile, Waves};
+use super::tile_likelihoods::TileLikelihoods;
 use super::vote::{Optimum, optimum, spread};
 use crate::control::Control;
 use crate::error::Result;
@@ -14,7 +12,7 @@ use crate::error::Result;
 pub(super) const LEAST_BLUR: f64 = 2.4;
 
 /// Longest blur that a tile shows, as a share of its side.
-const LONGEST_BLUR: f64 = 0.75;
+pub(super) const LONGEST_BLUR: f64 = 0.75;
 
 /// Step of the first grid in log s, and of the finer one.
 const STEPS: [f64; 2] = [0.095, 0.02];
@@ -24,9 +22,6 @@ const FINE: i32 = 6;
 
 /// Rounds of leaving out tiles too short at the s found.
 const GATES: usize = 4;
-
-/// Greatest frequency of the likelihood, rad/px, for the extent of the table.
-const GREATEST_FREQUENCY: f64 = 2.8;
 
 /// What the tiles say.
 pub(super) struct Found {
@@ -59,19 +54,23 @@ pub(super) fn search(
     random: &mut Random,
     control: &Control,
 ) -> Result<Evidence> {
-    let likelihoods = Likelihoods::new(tiles, waves, range.1, noise, control)?;
-    let (first, octaves) = (range.0.ln(), (range.1 / range.0).ln());
-    let steps = (octaves / STEPS[0]).ceil();
-    let grid: Vec<f64> = (0..=steps as usize).map(|i| first + i as f64 / steps * octaves).collect();
-    let all = likelihoods.curves(&grid)?;
-    let Some((coarse, used)) = gated(&all, tiles, waves.side, &grid) else {
+    let grid = first_grid(range);
+    let first = long_enough(tiles, waves.side, grid[grid.len() - 1].min(0.0));
+    if first.is_empty() {
+        // Only how much less is seen along the motion than across it tells.
+        let waves = waves.isotropic();
+        let likelihoods = TileLikelihoods::new(tiles, &waves, range.1, noise, control)?;
+        let all = likelihoods.curves(tiles, &grid)?;
         let whole = optimum(all.iter().map(Vec::as_slice), &grid);
         return Ok(Evidence::Dimming(whole.of_shapes));
-    };
+    }
+    let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
+    let all = likelihoods.curves(tiles, &grid)?;
+    let (coarse, used) = gated(&all, tiles, waves.side, &grid, first);
     let log_scale = if coarse.inside {
         let fine: Vec<f64> =
             (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
-        let refined = likelihoods.curves(&fine)?;
+        let refined = likelihoods.curves(tiles, &fine)?;
         optimum(used.iter().map(|&i| refined[i].as_slice()), &fine).log_scale
     } else {
         coarse.log_scale
@@ -82,71 +81,39 @@ pub(super) fn search(
     Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
 }
 
-/// Likelihoods of the tiles on any grid.
-struct Likelihoods<'a> {
-    tiles: &'a [Tile],
-    waves: &'a Waves,
-    scenes: SceneSpectra,
-    table: PathSpectrum,
-    noise: f64,
-    control: &'a Control,
+/// Logarithms of scales over all of `range`.
+pub(super) fn first_grid(range: (f64, f64)) -> Vec<f64> {
+    let (first, length) = (range.0.ln(), (range.1 / range.0).ln());
+    let steps = (length / STEPS[0]).ceil();
+    (0..=steps as usize).map(|i| first + i as f64 / steps * length).collect()
 }
 
-impl<'a> Likelihoods<'a> {
-    fn new(
-        tiles: &'a [Tile],
-        waves: &'a Waves,
-        most_scale: f64,
-        noise: f64,
-        control: &'a Control,
-    ) -> Result<Self> {
-        control.check()?;
-        let points = tiles.iter().flat_map(|tile| &tile.points);
-        let greatest =
-            points.map(|p| f64::from(p.curvature[0].hypot(p.curvature[1]))).fold(0.0, f64::max);
-        let table = PathSpectrum::new(greatest * most_scale.powi(2) * GREATEST_FREQUENCY);
-        let scenes = SceneSpectra::new(waves);
-        Ok(Self { tiles, waves, scenes, table, noise, control })
-    }
-
-    fn curves(&self, log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
-        let scales: Vec<f64> = log_scales.iter().map(|s| s.exp()).collect();
-        self.control.expect(self.tiles.len());
-        let of_tile = |tile: &Tile| {
-            self.control.advance()?;
-            Ok(curves(tile, self.waves, &self.scenes, &self.table, &scales, self.noise))
-        };
-        self.tiles.par_iter().map(of_tile).collect()
-    }
+/// Numbers of the tiles whose blur at a scale leaves a zero in the band and fits the tile.
+fn long_enough(tiles: &[Tile], side: usize, log_scale: f64) -> Vec<usize> {
+    let fits = |tile: &Tile| {
+        let blur = tile.speed * log_scale.exp();
+        blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
+    };
+    (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
 }
 
-/// The optimum of the tiles long enough at it, and which these are; None when there are none.
+/// The optimum of the tiles long enough at it, and which these are, beginning with `used`.
 fn gated(
     curves: &[Vec<f64>],
     tiles: &[Tile],
     side: usize,
     grid: &[f64],
-) -> Option<(Optimum, Vec<usize>)> {
-    let long_enough = |log_scale: f64| -> Vec<usize> {
-        let fits = |tile: &Tile| {
-            let blur = tile.speed * log_scale.exp();
-            blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
-        };
-        (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
-    };
+    mut used: Vec<usize>,
+) -> (Optimum, Vec<usize>) {
     let best = |used: &[usize]| optimum(used.iter().map(|&i| curves[i].as_slice()), grid);
-    let mut used = long_enough(grid[grid.len() - 1].min(0.0));
-    if used.is_empty() {
-        return None;
-    }
     let mut found = best(&used);
     for _ in 1..GATES {
-        let next = long_enough(found.log_scale);
+        let next = long_enough(tiles, side, found.log_scale);
         if next == used || next.is_empty() {
             break;
         }
         used = next;
         found = best(&used);
     }
-    Some((found, used))
+    (found, used)
 }

@@ -19,6 +19,9 @@ const LEAST_STEPS: f64 = 2.5;
 /// Greatest frequency used, rad/px: beyond it cameras, codecs and demosaicking shape the spectrum.
 const GREATEST: f64 = 2.7;
 
+/// Sectors of directions, in each of which a scene has a strength of its own.
+pub(super) const SECTORS: usize = 12;
+
 /// Greatest spread of a tile's motion, as a share of its length.
 const GREATEST_SPREAD: f64 = 0.35;
 
@@ -26,7 +29,7 @@ const GREATEST_SPREAD: f64 = 0.35;
 const GREATEST_UNKNOWN: f64 = 0.1;
 
 /// Least mean power of a tile in units of the noise's: below it the spectrum shows the noise.
-const LEAST_POWER: f64 = 20.0;
+const LEAST_POWER: f64 = 5.0;
 
 /// Points per axis: the three-point Gauss rule for a bell of the window's variance, (0.141 T)^2.
 const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1.0 / 6.0)];
@@ -34,7 +37,8 @@ const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1
 /// Number of points.
 pub(super) const POINTS: usize = NODES.len() * NODES.len();
 
-/// The waves at which tiles of one size are compared: half a plane, for a picture's spectrum is symmetric.
+/// The waves at which tiles of one size are compared, by direction: half a plane, for a picture's spectrum is symmetric.
+#[derive(Clone)]
 pub(super) struct Waves {
     /// Side T of the tiles, px.
     pub(super) side: usize,
@@ -42,6 +46,8 @@ pub(super) struct Waves {
     pub(super) x: Vec<f32>,
     /// Frequency downwards, rad/px.
     pub(super) y: Vec<f32>,
+    /// Ends of the sectors of directions, in which the waves lie one after the other.
+    pub(super) sectors: Vec<usize>,
     bins: Vec<usize>,
 }
 
@@ -51,22 +57,40 @@ impl Waves {
             let signed = if k > side / 2 { k as f64 - side as f64 } else { k as f64 };
             TAU * signed / side as f64
         };
-        let mut waves = Self { side, x: Vec::new(), y: Vec::new(), bins: Vec::new() };
         let least = LEAST_STEPS * TAU / side as f64;
+        let mut of_sectors = vec![Vec::new(); SECTORS];
         for bin in 0..side * side {
             let (y, x) = (frequency(bin / side), frequency(bin % side));
             let radius = x.hypot(y);
             if radius > least && radius < GREATEST && (y > 0.0 || (y == 0.0 && x > 0.0)) {
-                waves.bins.push(bin);
-                waves.x.push(x as f32);
-                waves.y.push(y as f32);
+                // The first sector lies about the x axis: on both ends of the half plane.
+                let sector = (y.atan2(x) / PI * SECTORS as f64 + 0.5) as usize % SECTORS;
+                of_sectors[sector].push((bin, x as f32, y as f32));
             }
         }
-        waves
+        let mut end = 0;
+        let ends = of_sectors.iter().map(|sector| {
+            end += sector.len();
+            end
+        });
+        let sectors = ends.collect();
+        let waves = of_sectors.concat();
+        Self {
+            side,
+            x: waves.iter().map(|w| w.1).collect(),
+            y: waves.iter().map(|w| w.2).collect(),
+            sectors,
+            bins: waves.iter().map(|w| w.0).collect(),
+        }
     }
 
     pub(super) fn len(&self) -> usize {
         self.bins.len()
+    }
+
+    /// The same with one sector of all directions.
+    pub(super) fn isotropic(&self) -> Self {
+        Self { sectors: vec![self.len()], ..self.clone() }
     }
 }
 
@@ -89,6 +113,8 @@ pub(super) struct Tile {
     pub(super) points: Vec<Point>,
     /// Periodogram at the waves, in squares of the picture's units.
     pub(super) power: Vec<f64>,
+    /// Its mean in units of the noise's power.
+    pub(super) contrast: f64,
 }
 
 impl Tile {
@@ -109,8 +135,8 @@ impl Tile {
             return None;
         }
         let power = periodogram(&frame.image.slice(part), waves, plan)?;
-        let mean = power.iter().sum::<f64>() / power.len() as f64;
-        if !(mean > LEAST_POWER * noise * noise) {
+        let contrast = power.iter().sum::<f64>() / power.len() as f64 / (noise * noise);
+        if !(contrast > LEAST_POWER) {
             return None;
         }
         let curves = [&frame.curvature.u, &frame.curvature.v].map(|field| field.slice(part));
@@ -133,7 +159,25 @@ impl Tile {
                 });
             }
         }
-        Some(Self { velocity: [u, v], speed, points, power })
+        Some(Self { velocity: [u, v], speed, points, power, contrast })
+    }
+
+    /// The same picture under a motion turned from right to down by `angle`, rad.
+    pub(super) fn turned(&self, angle: f64) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        let turn = |[u, v]: [f64; 2]| [cos * u - sin * v, sin * u + cos * v];
+        let single = |part: [f32; 2]| turn(part.map(f64::from)).map(|part| part as f32);
+        let points = self.points.iter().map(|point| Point {
+            weight: point.weight,
+            velocity: single(point.velocity),
+            curvature: single(point.curvature),
+        });
+        Self {
+            velocity: turn(self.velocity),
+            points: points.collect(),
+            power: self.power.clone(),
+            ..*self
+        }
     }
 }
 

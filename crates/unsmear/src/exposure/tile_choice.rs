@@ -25,6 +25,12 @@ const SIDES: [(usize, usize); 3] = [(64, 256), (48, 96), (32, 32)];
 /// Tiles from which smaller ones, which tell less each, are not tried.
 const ENOUGH_TILES: usize = 12;
 
+/// Mean power of a tile, in units of the noise's, from which it tells enough by itself.
+const STRONG: f64 = 20.0;
+
+/// Tiles, if fewer are strong: the strongest. A few can agree on a length by chance.
+const STRONGEST: usize = 24;
+
 /// Tiles of the greatest side of which there are enough, or else of that with most; None when there are none.
 pub(super) fn choose_tiles<T: Real>(
     frames: &[ExposureFrame<'_, T>],
@@ -80,10 +86,19 @@ fn tiles_of<T: Real>(
             })
             .collect::<Result<_>>()?;
         tiles.extend(found.into_iter().flatten());
-        if tiles.len() >= MOST_TILES {
+        if tiles.iter().filter(|tile| tile.contrast > STRONG).count() >= MOST_TILES {
             break;
         }
     }
+    keep_strong(&mut tiles);
     tiles.truncate(MOST_TILES);
     Ok(tiles)
+}
+
+/// Leaves the strong tiles in their order, or the strongest.
+fn keep_strong(tiles: &mut Vec<Tile>) {
+    let mut contrasts: Vec<f64> = tiles.iter().map(|tile| tile.contrast).collect();
+    contrasts.sort_unstable_by(|a, b| b.total_cmp(a));
+    let Some(&last) = contrasts.get(STRONGEST) else { return };
+    tiles.retain(|tile| tile.contrast > STRONG.min(last));
 }
