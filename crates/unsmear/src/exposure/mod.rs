@@ -11,7 +11,7 @@
 //! 3. the sum decides, then a finer grid around its optimum; shapes vote and tiles are resampled (`vote.rs`).
 //!
 //! s also takes up a common error of scale of the flow: what is found is the blur, s v. Trust: "ok" when 60 % of the
-//! shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
+//! plausible shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
 //! the shapes' optima, 1 at most, for blur assumed too short does little harm and blur assumed too long does much.
 //! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
 //! fits it by chance. Blur too short for zeros is told roughly by how much it dims (`short_blur.rs`), which "small" says;
@@ -38,7 +38,6 @@ use self::random::Random;
 use self::search::{Evidence, Found, LEAST_BLUR, first_grid, search};
 use self::short_blur::PRIOR;
 use self::tile_choice::choose_tiles;
-use self::vote::vote;
 use crate::array::require_same;
 use crate::control::Control;
 use crate::error::{Error, Result, require};
@@ -183,16 +182,15 @@ impl ExposureSearch {
 
     /// The likeliest share where it can be relied on, else a cautious one.
     fn of_zeros(&self, found: &Found, noise: f64) -> ExposureEstimate {
-        let agreement = vote(&found.of_shapes, found.log_scale);
-        let (likeliest, spread, tiles) = (found.log_scale.exp(), found.spread, found.tiles);
+        let &Found { vote, spread, tiles, .. } = found;
+        let likeliest = found.log_scale.exp();
         let credible = found.inside && (self.range.0..=self.range.1).contains(&likeliest);
-        let (value, status) = if credible && agreement >= TRUST.0 && spread <= TRUST.1 {
+        let (value, status) = if credible && vote >= TRUST.0 && spread <= TRUST.1 {
             (likeliest, ExposureStatus::Ok)
         } else {
             let cautious = median(found.of_shapes).exp().min(MOST_UNSURE).max(self.range.0);
             (cautious, ExposureStatus::Unsure)
         };
-        let vote = agreement;
         ExposureEstimate { value, turn: 0.0, status, vote, spread, tiles, likeliest, noise }
     }
 

@@ -4,7 +4,7 @@ use super::likelihood::SHAPES;
 use super::random::Random;
 use super::tile::{Tile, Waves};
 use super::tile_likelihoods::TileLikelihoods;
-use super::vote::{Optimum, optimum, spread};
+use super::vote::{Optimum, optimum, spread, vote};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -31,6 +31,8 @@ pub(super) struct Found {
     pub(super) inside: bool,
     /// Own optimum of each shape of the scene's spectrum.
     pub(super) of_shapes: [f64; SHAPES],
+    /// Share of the plausible shapes that agree.
+    pub(super) vote: f64,
     /// Deviation over resamplings of the tiles.
     pub(super) spread: f64,
     /// Tiles used.
@@ -77,8 +79,9 @@ pub(super) fn search(
     };
     let chosen: Vec<&[f64]> = used.iter().map(|&i| all[i].as_slice()).collect();
     let spread = spread(&chosen, &grid, random);
+    let (tiles, vote) = (chosen.len(), vote(&coarse, log_scale, chosen.len() * waves.len()));
     let Optimum { inside, of_shapes, .. } = coarse;
-    Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, spread, tiles: chosen.len() }))
+    Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, vote, spread, tiles }))
 }
 
 /// Logarithms of scales over all of `range`.
