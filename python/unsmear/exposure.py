@@ -39,8 +39,8 @@ class ExposureEstimate:
         could be measured; "small": because hardly anything moves by 3 px, so that no
         wave is missing and only how far they are dimmed tells, from .4 to .8.
     vote : float
-        Share, in [0, 1], of twelve assumptions on the scene's spectrum that agree;
-        NaN without tiles.
+        Share, in [0, 1], of those of twelve assumptions on the scene's spectrum that
+        explain it nearly as well as the best and agree with it; NaN without tiles.
     spread : float
         Deviation of the logarithm of the value over resampled tiles; NaN without.
     tiles : int
@@ -136,7 +136,7 @@ def estimate_exposure(
               e^{-\tau |\omega|^2} |K|^2 + m^2 \sigma^2,
 
     for :math:`\alpha \in \{2, 3\}, \tau \in \{0, .2, .5\}, m \in \{1, 1.5\}` and each
-    tile's own c. It needs blur between 2.4 and about 60 px, and pictures that were not
+    tile's own c in each of twelve sectors of directions. It needs blur between 2.4 and about 60 px, and pictures that were not
     sharpened after they were blurred.
 
     References
