@@ -136,8 +136,8 @@ def estimate_exposure(
               e^{-\tau |\omega|^2} |K|^2 + m^2 \sigma^2,
 
     for :math:`\alpha \in \{2, 3\}, \tau \in \{0, .2, .5\}, m \in \{1, 1.5\}` and each
-    tile's own c in each of twelve sectors of directions. It needs blur between 2.4 and about 60 px, and pictures that were not
-    sharpened after they were blurred.
+    tile's own c in each of twelve sectors of directions. It needs blur between 2.4 and
+    about 60 px, and pictures that were not sharpened after they were blurred.
 
     References
     ----------
