@@ -10,9 +10,10 @@
 //!    zero in the band and are left out;
 //! 3. the sum decides, then a finer grid around its optimum; shapes vote and tiles are resampled (`vote.rs`).
 //!
-//! s also takes up a common error of scale of the flow: what is found is the blur, s v. Trust: "ok" when 60 % of the
-//! plausible shapes agree, the spread is at most 0.12 and the optimum lies inside the range. Otherwise "unsure", s the median of
-//! the shapes' optima, 1 at most, for blur assumed too short does little harm and blur assumed too long does much.
+//! s also takes up a common error of scale of the flow: what is found is the blur, s v; if asked, also how far the flow
+//! points beside it (`direction.rs`). Trust: "ok" when 70 % of the plausible shapes agree, the spread is at most 0.12 and
+//! the optimum lies inside the range. Otherwise "unsure", s the median of the shapes' optima, 1 at most, for blur assumed
+//! too short does little harm and blur assumed too long does much.
 //! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
 //! fits it by chance. Blur too short for zeros is told roughly by how much it dims (`short_blur.rs`), which "small" says;
 //! without any tile s is 0.8.
@@ -51,7 +52,7 @@ const MARGIN: f64 = 1.17;
 const GREY_LEVELS: f64 = 255.0;
 
 /// Least vote and greatest spread of an estimate to be relied on.
-const TRUST: (f64, f64) = (0.6, 0.12);
+const TRUST: (f64, f64) = (0.7, 0.12);
 
 /// Greatest s while unsure.
 const MOST_UNSURE: f64 = 1.0;

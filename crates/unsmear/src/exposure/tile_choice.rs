@@ -102,3 +102,36 @@ fn keep_strong(tiles: &mut Vec<Tile>) {
     let Some(&last) = contrasts.get(STRONGEST) else { return };
     tiles.retain(|tile| tile.contrast > STRONG.min(last));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tiles(contrasts: impl Iterator<Item = f64>) -> Vec<Tile> {
+        let tile = |contrast| Tile {
+            velocity: [9.0, 0.0],
+            speed: 9.0,
+            points: Vec::new(),
+            power: Vec::new(),
+            contrast,
+        };
+        contrasts.map(tile).collect()
+    }
+
+    #[test]
+    fn keeps_what_is_strong_or_the_strongest() {
+        // All of few, however weak.
+        let mut few = tiles((0..STRONGEST).map(|_| 6.0));
+        keep_strong(&mut few);
+        assert_eq!(few.len(), STRONGEST);
+        // Two are strong: the best of the others fill up, in their order.
+        let mut weak = tiles((0..60).map(|i| if i < 2 { 90.0 } else { 6.0 + 0.1 * f64::from(i) }));
+        keep_strong(&mut weak);
+        assert_eq!(weak.len(), STRONGEST);
+        assert!(weak[1].contrast > STRONG && weak[2].contrast < weak[3].contrast);
+        // Enough are strong: only they.
+        let mut strong = tiles((0..60).map(|i| if i % 2 == 0 { 25.0 } else { 19.0 }));
+        keep_strong(&mut strong);
+        assert_eq!(strong.len(), 30);
+    }
+}
