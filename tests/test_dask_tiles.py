@@ -51,9 +51,22 @@ def test_tiles_equal_the_picture(dtype: Any, tile: tuple[int, int]) -> None:
     assert made.dtype == image.dtype and not np.array_equal(made, image)
     lazy_flow = da.from_array(flow, chunks=(50, 40, 1))
     for given in ({"noise": 1.0}, {"regularization": 0.02}):
-        whole = unsmear.deblur(image, flow, method="wiener", **given, **options).image
+        told = {"method": "wiener", "turn": 0, **given, **options}
+        whole = unsmear.deblur(image, flow, **told).image
         made = unsmear.dask.wiener(lazy, lazy_flow, longest=9, **given, **options)
         np.testing.assert_array_equal(made.compute(), whole)
+
+
+def test_tiles_take_a_flow_beside_the_blur_as_it_is() -> None:
+    # In memory the flow would be turned: every tile by an angle of its own is worse.
+    flow = np.full((160, 160, 2), (9.0, 2.0))
+    beside = np.full((160, 160, 2), (9.0, 0.4))
+    blurred = unsmear.blur(255 * synthetic.texture((160, 160), seed=3), flow)
+    lazy = da.from_array(blurred, chunks=80)
+    made = unsmear.dask.wiener(lazy, beside, noise=0.5).compute()
+    whole = unsmear.deblur(blurred, beside, method="wiener", noise=0.5, turn=0)
+    np.testing.assert_array_equal(made, whole.image)
+    assert unsmear.deblur(blurred, beside, method="wiener").report["turn"] > 5
 
 
 def test_a_smaller_halo_would_not_do() -> None:

@@ -72,8 +72,8 @@ def deblur(
     channel_axis : int, optional
         Axis of 1 or 3 colour channels. Default: grey.
     **options
-        ``exposure``, ``noise``, ``regularization``, ``gamma`` and ``degree``, as for
-        `unsmear.deblur`.
+        ``exposure``, ``turn``, ``noise``, ``regularization``, ``gamma``, ``degree``:
+        as for `unsmear.deblur`.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def deblur(
     >>> bool((lazy.frames[1].compute() == alone).all())
     True
     """
-    known = ("exposure", "noise", "regularization", "gamma", "degree")
+    known = ("exposure", "turn", "noise", "regularization", "gamma", "degree")
     for name in options:
         if name not in known:
             raise TypeError(f"option must be one of {', '.join(known)}, got {name!r}")

@@ -123,8 +123,9 @@ def wiener(
     Returns
     -------
     dask array
-        The picture of ``unsmear.deblur(method="wiener")`` of the whole, bit for bit;
-        like ``image`` in shape, type and tiles.
+        The picture of ``unsmear.deblur(method="wiener", turn=0)`` of the whole, bit
+        for bit (a tile alone cannot tell the whole picture's direction); like
+        ``image`` in shape, type and tiles.
 
     Raises
     ------
@@ -148,7 +149,8 @@ def wiener(
     >>> flow = np.full((120, 90, 2), (4.0, 2.0))
     >>> blurred = unsmear.blur(unsmear.synthetic.texture((120, 90), seed=1), flow)
     >>> lazy = unsmear.dask.wiener(da.from_array(blurred, chunks=64), flow, noise=0.5)
-    >>> whole = unsmear.deblur(blurred, flow, method="wiener", noise=0.5).image
+    >>> told = {"method": "wiener", "noise": 0.5, "turn": 0}
+    >>> whole = unsmear.deblur(blurred, flow, **told).image
     >>> bool((lazy.compute() == whole).all())
     True
     """
@@ -163,6 +165,7 @@ def wiener(
         "exposure": float(exposure),
         "noise": noise,
         "regularization": regularization,
+        "turn": 0.0,
     }
     halo = wiener_halo(most, float(exposure))
     return _tiled(restored_tile, image, flow, halo, most, options, channel_axis)
