@@ -36,7 +36,7 @@ def gains(flows: list[np.ndarray], **options: object) -> list[float]:
 # Good motion pays, wrong motion costs: 10 % of its length or 5 degrees halve the gain,
 # twice that consumes it. Both are found in the blur itself and put right: a common
 # error of length by ``exposure="auto"``, within a factor of 2.5, one of direction by
-# ``turn="auto"``, the default, between 5 and 20 degrees. ``turn=0`` takes it as it is.
+# ``turn="auto"``, the default, between 5 and 15 degrees. ``turn=0`` takes it as it is.
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 3.8), sharey=True, layout="constrained")
 by_length = [factor * case.velocity for factor in LENGTHS]

@@ -85,7 +85,7 @@ def deblur(
         see `unsmear.estimate_exposure`.
     turn : float or "auto", default "auto"
         Degrees, from right to down, by which the flow is turned before it is used.
-        "auto" finds one angle for the whole picture, of 5 to 20 degrees, in its blur,
+        "auto" finds one angle for the whole picture, of 5 to 15 degrees, in its blur,
         and leaves the flow as it is unless that is clear ("thesis" always does): a
         flow that runs 10 degrees beside the blur costs four fifths of the gain.
     method : str, default "tv"

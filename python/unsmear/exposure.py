@@ -105,7 +105,7 @@ def estimate_exposure(
         flow allowed; to 2.5 for one picture, whose flow may be in other units. A least
         one far from 0 makes a sharp picture find a blur that fits it by chance.
     turn : bool, optional
-        Whether ``flow`` may run beside the blur, by one angle of up to 20 degrees for
+        Whether ``flow`` may run beside the blur, by one angle of up to 15 degrees for
         the whole picture, as when it was made with another axis. Default: for one
         picture, not for several frames, whose flow is measured in them.
     seed : int, default 0

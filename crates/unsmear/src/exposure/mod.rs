@@ -70,7 +70,7 @@ pub struct ExposureSearch {
     pub noise: Option<f64>,
     /// Seed of the choice of tiles and of their resampling.
     pub seed: u64,
-    /// Whether the flow may point beside the blur, by up to 20 degrees: see `direction.rs`.
+    /// Whether the flow may point beside the blur, by up to some 15 degrees: see `direction.rs`.
     pub turn: bool,
 }
 
