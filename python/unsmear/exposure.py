@@ -39,7 +39,7 @@ class ExposureEstimate:
         could be measured; "small": because hardly anything moves by 3 px, so that no
         wave is missing and only how far they are dimmed tells, from .4 to .8.
     vote : float
-        Share, in [0, 1], of those of twelve assumptions on the scene's spectrum that
+        Share, in [0, 1], of those of ten assumptions on the scene's spectrum that
         explain it nearly as well as the best and agree with it; NaN without tiles.
     spread : float
         Deviation of the logarithm of the value over resampled tiles; NaN without.
@@ -135,9 +135,10 @@ def estimate_exposure(
     .. math:: \sum \log S + P / S, \qquad S = c\, |\omega|^{-\alpha}
               e^{-\tau |\omega|^2} |K|^2 + m^2 \sigma^2,
 
-    for :math:`\alpha \in \{2, 3\}, \tau \in \{0, .2, .5\}, m \in \{1, 1.5\}` and each
-    tile's own c in each of twelve sectors of directions. It needs blur between 2.4 and
-    about 60 px, and pictures that were not sharpened after they were blurred.
+    for the best of :math:`\alpha \in \{2.5, 3.5\}, \tau \in \{0, .2, .5\}, m \in \{1,
+    1.5\}` in each tile, and the tile's own c in each of twelve sectors of directions.
+    It needs blur between 2.4 and about 70 px (35 in pictures of less than 288 px), turns
+    of up to 15 degrees, and pictures not sharpened after they were blurred.
 
     References
     ----------

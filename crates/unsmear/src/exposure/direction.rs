@@ -7,11 +7,11 @@
 //! strong.
 //!
 //! A turn is believed if it is clear of 0 by [`LEAST_TURN`] and by [`CLEAR`] deviations over resamplings of the tiles, if
-//! shapes of the scene's spectrum agree, if neither it nor the scale with it lies at an end of its range, and if it
+//! kinds of scene agree, if neither it nor the scale with it lies at an end of its range, and if it
 //! explains the tiles better than no blur at all.
 
-use super::likelihood::SHAPES;
 use super::random::Random;
+use super::scene::{ALPHA, KINDS};
 use super::search::{LEAST_BLUR, LONGEST_BLUR};
 use super::tile::{Tile, Waves};
 use super::tile_likelihoods::TileLikelihoods;
@@ -22,7 +22,7 @@ use crate::error::Result;
 const COARSE: [f64; 5] = [0.0, -6.0, 6.0, -12.0, 12.0];
 
 /// Step of the fine grid, degrees, and the steps to either side.
-const FINE: (f64, i32) = (2.0, 4);
+const FINE: (f64, i32) = (2.0, 3);
 
 /// Scales that the fine grid looks at, to either side of the best.
 const NEAR: usize = 2;
@@ -30,8 +30,8 @@ const NEAR: usize = 2;
 /// A scale at which nothing is blurred: a picture that fits it better has no direction.
 const SHARP: f64 = 1e-3;
 
-/// Tiles asked first and then.
-const TILES: (usize, usize) = (12, 40);
+/// Tiles of 64 px asked first and then; of larger ones, which tell more each, fewer.
+const TILES: (usize, usize) = (12, 28);
 
 /// Fewest tiles that are believed.
 const LEAST_TILES: usize = 8;
@@ -42,7 +42,7 @@ const LEAST_TURN: f64 = 5.0;
 /// Deviations that a turn must be away from 0.
 const CLEAR: f64 = 3.0;
 
-/// Distance from the winner within which a shape of the scene's spectrum agrees, degrees, and the share that must.
+/// Distance from the winner within which a kind of scene agrees, degrees, and the share that must.
 const AGREEMENT: (f64, f64) = (3.0, 0.6);
 
 /// Resamplings of the tiles.
@@ -66,18 +66,20 @@ impl TurnSearch<'_> {
     pub(super) fn find(&self, random: &mut Random, control: &Control) -> Result<f64> {
         let longest = self.log_scales[self.log_scales.len() - 1].exp().min(1.0);
         let fits = |tile: &&Tile| tile.speed * longest < LONGEST_BLUR * self.waves.side as f64;
-        let mut tiles: Vec<&Tile> = self.tiles.iter().filter(fits).take(TILES.1).collect();
+        let few =
+            |tiles: usize| (tiles * 64 * 64 / self.waves.side.pow(2)).clamp(LEAST_TILES, tiles);
+        let mut tiles: Vec<&Tile> = self.tiles.iter().filter(fits).take(few(TILES.1)).collect();
         if tiles.len() < LEAST_TILES {
             return Ok(0.0);
         }
-        let some = &tiles[..tiles.len().min(TILES.0)];
+        let some = &tiles[..tiles.len().min(few(TILES.0))];
         let most = self.log_scales[self.log_scales.len() - 1].exp();
         let (waves, noise) = (self.waves, self.noise);
-        let likelihoods = TileLikelihoods::new(self.tiles, waves, most, noise, control)?;
+        let likelihoods = TileLikelihoods::new(self.tiles, waves, ALPHA, most, noise, control)?;
         let coarse = Turned::new(some, &COARSE, self.log_scales, &likelihoods)?;
         let every: Vec<usize> = (0..some.len()).collect();
         let (value, turn, scale) = coarse.best(&every);
-        if COARSE[turn] == 0.0 || scale == 0 || scale + 1 == self.log_scales.len() {
+        if COARSE[turn] == 0.0 {
             return Ok(0.0);
         }
         let (sharp, _, _) = Turned::new(some, &[0.0], &[SHARP.ln()], &likelihoods)?.best(&every);
@@ -88,12 +90,17 @@ impl TurnSearch<'_> {
         tiles.retain(|tile| tile.speed * self.log_scales[scale].exp() > LEAST_BLUR);
         let around = |i: i32| COARSE[turn] + FINE.0 * f64::from(i);
         let turns: Vec<f64> = (-FINE.1..=FINE.1).map(around).collect();
-        let fine = Turned::new(&tiles, &turns, &self.log_scales[near], &likelihoods)?;
+        let fine = Turned::new(&tiles, &turns, &self.log_scales[near.clone()], &likelihoods)?;
+        let every: Vec<usize> = (0..tiles.len()).collect();
+        let scale = near.start + fine.best(&every).2;
+        if scale == 0 || scale + 1 == self.log_scales.len() {
+            return Ok(0.0);
+        }
         Ok(fine.believed(&turns, random).to_radians())
     }
 }
 
-/// -log L by turn, tile, shape (outer) and scale (inner).
+/// -log L by turn, tile, kind of scene and at last any (outer) and scale (inner).
 struct Turned {
     curves: Vec<Vec<Vec<f64>>>,
     scales: usize,
@@ -135,16 +142,16 @@ impl Turned {
             return 0.0;
         }
         let every: Vec<usize> = (0..tiles).collect();
-        let of_shapes = self.profiles(&every);
-        let Some(found) = parabola(&lowest(&of_shapes), turns) else { return 0.0 };
+        let of_kinds = self.profiles(&every);
+        let Some(found) = parabola(&of_kinds[KINDS], turns) else { return 0.0 };
         let agree = |profile: &&Vec<f64>| {
             parabola(profile, turns).is_some_and(|own| (own - found).abs() <= AGREEMENT.0)
         };
-        let vote = of_shapes.iter().filter(agree).count() as f64 / SHAPES as f64;
+        let vote = of_kinds[..KINDS].iter().filter(agree).count() as f64 / KINDS as f64;
         let mut redrawn: Vec<f64> = (0..RESAMPLINGS)
             .map(|_| {
                 let drawn: Vec<usize> = every.iter().map(|_| random.below(tiles)).collect();
-                parabola(&lowest(&self.profiles(&drawn)), turns).unwrap_or(0.0)
+                parabola(&self.profiles(&drawn)[KINDS], turns).unwrap_or(0.0)
             })
             .collect();
         redrawn.sort_unstable_by(f64::total_cmp);
@@ -154,9 +161,9 @@ impl Turned {
         if clear { found } else { 0.0 }
     }
 
-    /// Least -log L over the scales, by shape and turn.
+    /// Least -log L over the scales, by kind of scene and at last any, and turn.
     fn profiles(&self, drawn: &[usize]) -> Vec<Vec<f64>> {
-        let mut profiles = vec![Vec::new(); SHAPES];
+        let mut profiles = vec![Vec::new(); KINDS + 1];
         for turn in 0..self.curves.len() {
             let sum = self.sum(turn, drawn);
             for (profile, curve) in profiles.iter_mut().zip(sum.chunks(self.scales)) {
@@ -167,19 +174,13 @@ impl Turned {
     }
 
     fn sum(&self, turn: usize, drawn: &[usize]) -> Vec<f64> {
-        let mut sum = vec![0.0; SHAPES * self.scales];
+        let mut sum = vec![0.0; (KINDS + 1) * self.scales];
         for &tile in drawn {
             let curves = &self.curves[turn][tile];
             sum.iter_mut().zip(curves).for_each(|(sum, value)| *sum += value);
         }
         sum
     }
-}
-
-/// The lowest of several curves at every place.
-fn lowest(curves: &[Vec<f64>]) -> Vec<f64> {
-    let at = |i: usize| curves.iter().map(|curve| curve[i]).fold(f64::INFINITY, f64::min);
-    (0..curves[0].len()).map(at).collect()
 }
 
 fn least(values: &[f64]) -> usize {

@@ -4,19 +4,25 @@
 //!
 //! ```text
 //! -log L = sum_w [ log S + P / S ],        S(w) = c g(w) (K2(w) + 1e-6) + m^2 sigma^2
-//! g(w)   = |w|^-alpha exp(-tau |w|^2)
 //! K2(w)  = sum over points of the tile and over three neighbouring waves of  weight |K(w; s V, s^2 q)|^2
 //! ```
 //!
-//! (P. Whittle, J. R. Stat. Soc. B 15 (1953) 125-139, doi:10.1111/j.2517-6161.1953.tb00131.x). What a scene's spectrum
-//! looks like is not known: alpha in {2, 3} (texture or edges), tau in {0, .2, .5} (lens and sampling) and m in {1, 1.5}
-//! (noise that is not white) make [`SHAPES`] nuisance shapes. The strength c is a tile's own in each of twelve sectors of
-//! directions, found by Fisher's scoring in log c: buildings have most of their power near two directions, and with one
-//! c for all, the blur found is one that explains this. What tells is how the power rises and falls along each direction;
-//! only blur too short for zeros leaves nothing to go by but how it differs between directions.
+//! (P. Whittle, J. R. Stat. Soc. B 15 (1953) 125-139, doi:10.1111/j.2517-6161.1953.tb00131.x), with g and m one of the
+//! shapes of `scene.rs`. The strength c is a tile's own in each of twelve sectors of directions, found by Fisher's scoring
+//! in log c: buildings have most of their power near two directions, and with one c for all, the blur found is one that
+//! explains this. What tells is how the power rises and falls along each direction; only blur too short for zeros leaves
+//! nothing to go by but how it differs between directions.
 //!
-//! The three waves, 0.8 of a bin apart along the motion, stand for the leakage of the window, which fills up zeros; each
-//! counts with the scene's power there, for the lower wave, being stronger, moves the zeros up (by 1 % of s).
+//! The three waves stand for the leakage of the window, which fills up zeros. At a blur of L px, K2 is a sum of cosines of
+//! lags up to L, and leakage multiplies that of lag l by the window's autocorrelation,
+//!
+//! ```text
+//! rho(x) = (1 - x) (2 + cos 2 pi x) / 3 + sin(2 pi x) / (2 pi),      x = l / T      (Hann)
+//! ```
+//!
+//! for which the weights and offsets below stand to .01 up to x = 1/2: 10 % too much leakage make
+//! long blur 2 % too long. Each wave counts with the scene's power there, for the lower, being stronger, moves the zeros up
+//! (by 1 % of s).
 #![allow(
     clippy::inline_always,
     reason = "a helper gets its caller's vector instructions only when inlined"
@@ -27,27 +33,16 @@ use std::f64::consts::TAU;
 use multiversion::multiversion;
 
 use super::path_spectrum::PathSpectrum;
+use super::scene::{SHAPES, SceneSpectra};
 use super::tile::{SECTORS, Tile, Waves};
-
-/// Decays of the scene's amplitude spectrum squared.
-const ALPHA: [f64; 2] = [2.0, 3.0];
-
-/// Softness of lens and sampling, px^2.
-const SOFTNESS: [f64; 3] = [0.0, 0.2, 0.5];
-
-/// Noise in the band, in units of the measured one.
-const NOISE_FACTORS: [f64; 2] = [1.0, 1.5];
-
-/// Number of shapes tried.
-pub(super) const SHAPES: usize = ALPHA.len() * SOFTNESS.len() * NOISE_FACTORS.len();
 
 /// Least share of the texture's power that passes any zero: no model of a path is exact.
 const LEAST_PASS: f64 = 1e-6;
 
-/// Weight and offset, in bins of the transform, of the waves that leak into one: the window's variance, 0.33.
-const LEAKAGE: [(f64, f64); 3] = [(0.25, -0.8), (0.5, 0.0), (0.25, 0.8)];
+/// Weight and offset, in bins of the transform, of the waves that leak into one.
+const LEAKAGE: [(f64, f64); 3] = [(0.216, -0.86), (0.568, 0.0), (0.216, 0.86)];
 
-/// Decay of the scene's power spectrum supposed for the leakage: the mean of [`ALPHA`].
+/// Decay of the scene's power spectrum supposed for the leakage.
 const LEAKAGE_ALPHA: f64 = 2.5;
 
 /// Steps of Fisher's scoring from a guess and from the strength for the length before: then right to 1e-3.
@@ -58,23 +53,6 @@ const LONGEST_STEP: f64 = 1.5;
 
 /// Samples whose spectra are multiplied before one logarithm is taken: (1e12)^24 is still a double.
 const LOG_BLOCK: usize = 24;
-
-/// Spectra of the scene at the waves, one per pair of alpha and tau.
-pub(super) struct SceneSpectra(Vec<Vec<f64>>);
-
-impl SceneSpectra {
-    pub(super) fn new(waves: &Waves) -> Self {
-        let spectrum = |alpha: f64, tau: f64| {
-            let at = |(&x, &y): (&f32, &f32)| {
-                let square = f64::from(x).powi(2) + f64::from(y).powi(2);
-                square.powf(-alpha / 2.0) * (-tau * square).exp()
-            };
-            waves.x.iter().zip(&waves.y).map(at).collect()
-        };
-        let pairs = ALPHA.iter().flat_map(|&alpha| SOFTNESS.map(move |tau| (alpha, tau)));
-        Self(pairs.map(|(alpha, tau)| spectrum(alpha, tau)).collect())
-    }
-}
 
 /// -log L of a tile for every shape (outer) and scale (inner).
 pub(super) fn curves(
@@ -93,11 +71,11 @@ pub(super) fn curves(
     for (index, &scale) in scales.iter().enumerate() {
         power_passed(tile, waves, &leakage, table, scale, &mut pass);
         for shape in 0..SHAPES {
-            let scene = &scenes.0[shape / NOISE_FACTORS.len()];
+            let (scene, noise_factor) = scenes.shape(shape);
             for ((value, &g), &k2) in texture.iter_mut().zip(scene).zip(&pass) {
                 *value = g * (f64::from(k2) + LEAST_PASS);
             }
-            let floor = (NOISE_FACTORS[shape % NOISE_FACTORS.len()] * noise).powi(2);
+            let floor = (noise_factor * noise).powi(2);
             let strengths = &mut strengths[shape * SECTORS..][..SECTORS];
             values[shape * scales.len() + index] =
                 over_sectors(&tile.power, &texture, &waves.sectors, floor, strengths);
@@ -129,7 +107,7 @@ fn over_sectors(
 
 /// Waves that leak into each wave of a tile: their shift, and their weight times the scene's power relative to the
 /// wave's own.
-struct Leakage([([f32; 2], Vec<f32>); 3]);
+struct Leakage([([f32; 2], Vec<f32>); LEAKAGE.len()]);
 
 impl Leakage {
     fn new(tile: &Tile, waves: &Waves) -> Self {
@@ -243,6 +221,7 @@ fn blocks(samples: &[f64]) -> impl Iterator<Item = &[f64; LANES]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exposure::scene::ALPHA;
     use crate::exposure::tile::Point;
 
     /// A tile whose periodogram is the model itself: the likelihood is then greatest at the truth.
@@ -250,21 +229,28 @@ mod tests {
     fn is_least_at_the_truth_whatever_the_shape() {
         let (waves, noise) = (Waves::new(48), 1.0);
         let table = PathSpectrum::new(8.0);
-        let scenes = SceneSpectra::new(&waves);
+        let scenes = SceneSpectra::new(&waves, ALPHA);
         let point = Point { weight: 1.0, velocity: [9.0, 4.0], curvature: [1.0, 2.0] };
         let (velocity, power) = ([9.0, 4.0], vec![0.0; waves.len()]);
-        let mut tile =
-            Tile { velocity, speed: 97f64.sqrt(), points: vec![point], power, contrast: 1.0 };
+        let mut tile = Tile {
+            velocity,
+            speed: 97f64.sqrt(),
+            points: vec![point],
+            strain: 0.0,
+            power,
+            contrast: 1.0,
+        };
         let leakage = Leakage::new(&tile, &waves);
         let mut pass = vec![0.0; waves.len()];
         power_passed(&tile, &waves, &leakage, &table, 0.8, &mut pass);
         let scales = [0.7, 0.75, 0.8, 0.85, 0.9];
-        for (scene, strength) in [(0, 5e3), (4, 2e3)] {
-            for ((power, g), k2) in tile.power.iter_mut().zip(&scenes.0[scene]).zip(&pass) {
+        for (scene, strength) in [(0, 5e3), (8, 2e3)] {
+            let (spectrum, _) = scenes.shape(scene);
+            for ((power, g), k2) in tile.power.iter_mut().zip(spectrum).zip(&pass) {
                 *power = strength * g * f64::from(*k2) + noise * noise;
             }
             let values = curves(&tile, &waves, &scenes, &table, &scales, noise);
-            let curve = &values[scene * NOISE_FACTORS.len() * scales.len()..][..scales.len()];
+            let curve = &values[scene * scales.len()..][..scales.len()];
             assert!(curve.iter().all(|&value| value >= curve[2]), "{curve:?}");
         }
     }

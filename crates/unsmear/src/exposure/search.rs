@@ -1,10 +1,11 @@
 //! The search over the scale of the blur: a coarse grid, the tiles long enough at its optimum, a fine grid.
 
-use super::likelihood::SHAPES;
 use super::random::Random;
+use super::scene::{ALPHA, KINDS};
+use super::short_blur::by_dimming;
 use super::tile::{Tile, Waves};
 use super::tile_likelihoods::TileLikelihoods;
-use super::vote::{Optimum, optimum, spread, vote};
+use super::vote::{Optimum, optimum, parabola, spread, sum, vote};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -12,13 +13,27 @@ use crate::error::Result;
 pub(super) const LEAST_BLUR: f64 = 2.4;
 
 /// Longest blur that a tile shows, as a share of its side.
-pub(super) const LONGEST_BLUR: f64 = 0.75;
+pub(super) const LONGEST_BLUR: f64 = 0.6;
 
-/// Step of the first grid in log s, and of the finer one.
-const STEPS: [f64; 2] = [0.095, 0.02];
+/// Longest mean blur that is read right, as a share of the tiles' side: of longer ones about this is found.
+const LONGEST_READ: f64 = 0.56;
 
-/// Steps of the finer grid to either side.
-const FINE: i32 = 6;
+/// Step of the first grid in log s.
+const STEP: f64 = 0.095;
+
+/// Steps of the finer grid in one of the first: the likelihood of a blur of 40 px is some 0.1 wide.
+const FINER: usize = 3;
+
+/// -log L per sample above the least of the first grid that the finer one still covers, and the least steps of the
+/// first to either side.
+const NEAR: (f64, usize) = (0.03, 2);
+
+/// Most that the blur may differ between places 1 px apart, px: waves
+/// turned or stretched during it fill the zeros. A turn by 12 degrees is read to 5 %, one by 25 degrees not at all.
+const MOST_STRAIN: f64 = 0.35;
+
+/// Tiles asked over the whole range, of those at hand.
+const FIRST_TILES: usize = 48;
 
 /// Rounds of leaving out tiles too short at the s found.
 const GATES: usize = 4;
@@ -29,9 +44,9 @@ pub(super) struct Found {
     pub(super) log_scale: f64,
     /// Whether it lies within the range searched, not at its end.
     pub(super) inside: bool,
-    /// Own optimum of each shape of the scene's spectrum.
-    pub(super) of_shapes: [f64; SHAPES],
-    /// Share of the plausible shapes that agree.
+    /// Own optimum of each kind of scene.
+    pub(super) of_kinds: [f64; KINDS],
+    /// Share of the plausible kinds that agree.
     pub(super) vote: f64,
     /// Deviation over resamplings of the tiles.
     pub(super) spread: f64,
@@ -43,8 +58,8 @@ pub(super) struct Found {
 pub(super) enum Evidence {
     /// Zeros of the blur's spectrum in the band.
     Zeros(Found),
-    /// Blur too short for them: optima of the shapes over all tiles.
-    Dimming([f64; SHAPES]),
+    /// Blur too short for them: the scale by how much it dims.
+    Dimming(f64),
 }
 
 /// Searches `range`.
@@ -56,67 +71,85 @@ pub(super) fn search(
     random: &mut Random,
     control: &Control,
 ) -> Result<Evidence> {
-    let grid = first_grid(range);
-    let first = long_enough(tiles, waves.side, grid[grid.len() - 1].min(0.0));
-    if first.is_empty() {
-        // Only how much less is seen along the motion than across it tells.
-        let waves = waves.isotropic();
-        let likelihoods = TileLikelihoods::new(tiles, &waves, range.1, noise, control)?;
-        let all = likelihoods.curves(tiles, &grid)?;
-        let whole = optimum(all.iter().map(Vec::as_slice), &grid);
-        return Ok(Evidence::Dimming(whole.of_shapes));
+    let side = waves.side;
+    let grid = first_grid(readable(tiles, side, range));
+    let first_scale = grid[grid.len() - 1].min(0.0);
+    if telling(tiles, side, first_scale).is_empty() {
+        return by_dimming(tiles, waves, &grid, noise, control).map(Evidence::Dimming);
     }
-    let likelihoods = TileLikelihoods::new(tiles, waves, range.1, noise, control)?;
-    let all = likelihoods.curves(tiles, &grid)?;
-    let (coarse, used) = gated(&all, tiles, waves.side, &grid, first);
-    let log_scale = if coarse.inside {
-        let fine: Vec<f64> =
-            (-FINE..=FINE).map(|i| coarse.log_scale + f64::from(i) * STEPS[1]).collect();
-        let refined = likelihoods.curves(tiles, &fine)?;
-        optimum(used.iter().map(|&i| refined[i].as_slice()), &fine).log_scale
-    } else {
-        coarse.log_scale
-    };
-    let chosen: Vec<&[f64]> = used.iter().map(|&i| all[i].as_slice()).collect();
-    let spread = spread(&chosen, &grid, random);
-    let (tiles, vote) = (chosen.len(), vote(&coarse, log_scale, chosen.len() * waves.len()));
-    let Optimum { inside, of_shapes, .. } = coarse;
-    Ok(Evidence::Zeros(Found { log_scale, inside, of_shapes, vote, spread, tiles }))
+    let likelihoods = TileLikelihoods::new(tiles, waves, ALPHA, range.1, noise, control)?;
+    let some = &tiles[..tiles.len().min(FIRST_TILES)];
+    let some = if telling(some, side, first_scale).is_empty() { tiles } else { some };
+    let curves = likelihoods.curves(some, &grid)?;
+    let (scale, means) = gated(&curves, some, side, &grid, first_scale);
+    let grid = finer(&means, &grid);
+    let tiles: Vec<&Tile> = tiles.iter().filter(|tile| tells(tile, side, scale)).collect();
+    let curves = likelihoods.curves(&tiles, &grid)?;
+    let curves: Vec<&[f64]> = curves.iter().map(Vec::as_slice).collect();
+    let found = optimum(curves.iter().copied(), &grid);
+    let spread = spread(&curves, &grid, random);
+    let vote = vote(&found, tiles.len() * waves.len());
+    let Optimum { log_scale, mut inside, of_kinds, .. } = found;
+    let speed = tiles.iter().map(|tile| tile.speed).sum::<f64>() / tiles.len() as f64;
+    inside &= speed * log_scale.exp() < LONGEST_READ * side as f64;
+    Ok(Evidence::Zeros(Found { log_scale, inside, of_kinds, vote, spread, tiles: tiles.len() }))
+}
+
+/// The part of `range` at which the blur of some tile fits it.
+fn readable(tiles: &[Tile], side: usize, range: (f64, f64)) -> (f64, f64) {
+    let slowest = tiles.iter().map(|tile| tile.speed).fold(f64::INFINITY, f64::min);
+    let longest = LONGEST_BLUR * side as f64 / slowest;
+    (range.0, range.1.min(longest).max(range.0 * STEP.exp()))
+}
+
+/// A finer grid over what means of -log L per sample on the first one leave open.
+fn finer(means: &[f64], grid: &[f64]) -> Vec<f64> {
+    let limit = means.iter().copied().fold(f64::INFINITY, f64::min) + NEAR.0;
+    let open: Vec<usize> = (0..grid.len()).filter(|&i| means[i] <= limit).collect();
+    let (first, last) = (open[0].saturating_sub(NEAR.1), open[open.len() - 1] + NEAR.1);
+    let last = last.min(grid.len() - 1);
+    let step = (grid[last] - grid[first]) / (FINER * (last - first)) as f64;
+    (0..=FINER * (last - first)).map(|i| grid[first] + i as f64 * step).collect()
 }
 
 /// Logarithms of scales over all of `range`.
 pub(super) fn first_grid(range: (f64, f64)) -> Vec<f64> {
     let (first, length) = (range.0.ln(), (range.1 / range.0).ln());
-    let steps = (length / STEPS[0]).ceil();
+    let steps = (length / STEP).ceil().max(1.0);
     (0..=steps as usize).map(|i| first + i as f64 / steps * length).collect()
 }
 
-/// Numbers of the tiles whose blur at a scale leaves a zero in the band and fits the tile.
-fn long_enough(tiles: &[Tile], side: usize, log_scale: f64) -> Vec<usize> {
-    let fits = |tile: &Tile| {
-        let blur = tile.speed * log_scale.exp();
-        blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64
-    };
-    (0..tiles.len()).filter(|&i| fits(&tiles[i])).collect()
+/// Whether the blur at a scale leaves a zero in the band, fits the tile, and is the same nearly all over it.
+fn tells(tile: &Tile, side: usize, log_scale: f64) -> bool {
+    let scale = log_scale.exp();
+    let blur = tile.speed * scale;
+    blur > LEAST_BLUR && blur < LONGEST_BLUR * side as f64 && tile.strain * scale < MOST_STRAIN
 }
 
-/// The optimum of the tiles long enough at it, and which these are, beginning with `used`.
+/// Numbers of the tiles that tell something at a scale.
+fn telling(tiles: &[Tile], side: usize, log_scale: f64) -> Vec<usize> {
+    (0..tiles.len()).filter(|&i| tells(&tiles[i], side, log_scale)).collect()
+}
+
+/// The scale at which the tiles that tell something have their optimum, beginning with `log_scale`, as it was when they
+/// were chosen, and means of their -log L per sample.
 fn gated(
     curves: &[Vec<f64>],
     tiles: &[Tile],
     side: usize,
     grid: &[f64],
-    mut used: Vec<usize>,
-) -> (Optimum, Vec<usize>) {
-    let best = |used: &[usize]| optimum(used.iter().map(|&i| curves[i].as_slice()), grid);
-    let mut found = best(&used);
+    mut log_scale: f64,
+) -> (f64, Vec<f64>) {
+    let mut used = telling(tiles, side, log_scale);
+    let together = |used: &[usize]| sum(used.iter().map(|&i| curves[i].as_slice()), grid.len());
     for _ in 1..GATES {
-        let next = long_enough(tiles, side, found.log_scale);
+        let found = parabola(&together(&used), grid).0;
+        let next = telling(tiles, side, found);
         if next == used || next.is_empty() {
             break;
         }
-        used = next;
-        found = best(&used);
+        (used, log_scale) = (next, found);
     }
-    (found, used)
+    let samples = (used.len() * tiles[0].power.len()) as f64;
+    (log_scale, together(&used).iter().map(|sum| sum / samples).collect())
 }

@@ -12,6 +12,16 @@
 //! photographs that move by 1.5 px. Where no tile tells anything either, s is 0.8. The bound and the least share hold
 //! the harm of a mistake down: blur assumed too long costs several times what blur assumed too short does.
 
+use super::scene::SHAPES;
+use super::tile::{Tile, Waves};
+use super::tile_likelihoods::TileLikelihoods;
+use super::vote::parabola;
+use crate::control::Control;
+use crate::error::Result;
+
+/// Decays of the scene's power spectrum, on either side of the usual.
+const ALPHA: [f64; 2] = [2.0, 3.0];
+
 /// s when nothing tells, and the most assumed of short blur.
 pub(super) const PRIOR: f64 = 0.8;
 
@@ -24,8 +34,27 @@ pub(super) const SLOWEST: f64 = 0.7;
 /// Tiles from which slower ones, which tell less each, are not asked.
 pub(super) const ENOUGH_TILES: usize = 12;
 
+/// s of `tiles` by how much less is seen along the motion than across it; `log_scales` are those tried.
+pub(super) fn by_dimming(
+    tiles: &[Tile],
+    waves: &Waves,
+    log_scales: &[f64],
+    noise: f64,
+    control: &Control,
+) -> Result<f64> {
+    let (n, most) = (log_scales.len(), log_scales[log_scales.len() - 1].exp());
+    let waves = waves.isotropic();
+    let likelihoods = TileLikelihoods::new(tiles, &waves, ALPHA, most, noise, control)?;
+    let mut sum = vec![0.0; SHAPES * n];
+    for curves in likelihoods.of_shapes(tiles, log_scales)? {
+        sum.iter_mut().zip(curves).for_each(|(sum, value)| *sum += value);
+    }
+    let of_shapes: Vec<f64> = sum.chunks(n).map(|curve| parabola(curve, log_scales).0).collect();
+    Ok(cautious(&of_shapes))
+}
+
 /// s, see the [module](self), of the logarithms of the optima.
-pub(super) fn cautious(of_shapes: &[f64]) -> f64 {
+fn cautious(of_shapes: &[f64]) -> f64 {
     let say = |log: &f64| log.clamp(CREDIBLE.0.ln(), CREDIBLE.1.ln());
     let mean = of_shapes.iter().map(say).sum::<f64>() / of_shapes.len() as f64;
     mean.exp().min(PRIOR)

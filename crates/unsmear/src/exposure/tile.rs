@@ -34,6 +34,10 @@ const LEAST_POWER: f64 = 5.0;
 /// Points per axis: the three-point Gauss rule for a bell of the window's variance, (0.141 T)^2.
 const NODES: [(f64, f64); 3] = [(-0.245, 1.0 / 6.0), (0.0, 2.0 / 3.0), (0.245, 1.0 / 6.0)];
 
+/// Greatest difference between points in the phase w . D of the path's ends at the highest frequency, rad, that does not
+/// matter: |K|^2 then differs by .003 where it bends most.
+const GREATEST_PHASE: f64 = 0.2;
+
 /// Number of points.
 pub(super) const POINTS: usize = NODES.len() * NODES.len();
 
@@ -111,6 +115,8 @@ pub(super) struct Tile {
     /// Its length, px/frame.
     pub(super) speed: f64,
     pub(super) points: Vec<Point>,
+    /// How much the motion differs between places 1 px apart, px/frame.
+    pub(super) strain: f64,
     /// Periodogram at the waves, in squares of the picture's units.
     pub(super) power: Vec<f64>,
     /// Its mean in units of the noise's power.
@@ -159,7 +165,11 @@ impl Tile {
                 });
             }
         }
-        Some(Self { velocity: [u, v], speed, points, power, contrast })
+        let strain = strain(&points, side);
+        if same(&points) {
+            points = vec![Point { weight: 1.0, ..points[POINTS / 2] }];
+        }
+        Some(Self { velocity: [u, v], speed, points, strain, power, contrast })
     }
 
     /// The same picture under a motion turned from right to down by `angle`, rad.
@@ -179,6 +189,27 @@ impl Tile {
             ..*self
         }
     }
+}
+
+/// The greater difference of the motion between opposite sides of the tile, per px of their distance.
+fn strain(points: &[Point], side: usize) -> f64 {
+    let (n, distance) = (NODES.len(), 2.0 * NODES[2].0 * side as f64);
+    let difference = |a: usize, b: usize| {
+        let [(au, av), (bu, bv)] = [a, b].map(|i| points[i].velocity.into());
+        f64::from((au - bu).hypot(av - bv)) / distance
+    };
+    let middle = POINTS / 2;
+    difference(middle - n, middle + n).max(difference(middle - 1, middle + 1))
+}
+
+/// Whether the motion differs so little between the points that they all let the same waves through.
+fn same(points: &[Point]) -> bool {
+    let middle = points[POINTS / 2];
+    let far = |a: [f32; 2], b: [f32; 2]| f64::from((a[0] - b[0]).hypot(a[1] - b[1]));
+    points.iter().all(|point| {
+        let curve = far(point.curvature, middle.curvature) / 8.0;
+        far(point.velocity, middle.velocity) + curve < GREATEST_PHASE / GREATEST
+    })
 }
 
 /// Mean and deviation of the known samples; None when too many are unknown.

@@ -1,8 +1,9 @@
-//! Which tiles of the frames are used: a random hundred of those that tell something, as large as can be.
+//! Which tiles of the frames are used: a random hundred of those that tell something, large ones where motion is large.
 //!
 //! Corners lie half a tile apart. A fixed seed puts them in an order, in which they are looked at until enough have
 //! been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
 
+use ndarray::s;
 use rayon::prelude::*;
 
 use super::frame::ExposureFrame;
@@ -13,14 +14,31 @@ use crate::error::Result;
 use crate::fourier::Fft2;
 use crate::real::Real;
 
-/// Most tiles used: beyond it the model, not the number of tiles, limits what is found.
-const MOST_TILES: usize = 100;
-
 /// Tiles looked at together; a fixed number, so that the result does not depend on threads.
 const BATCH: usize = 128;
 
-/// Sides of tiles, px, and the shorter side of the smallest picture for each.
-const SIDES: [(usize, usize); 3] = [(64, 256), (48, 96), (32, 32)];
+/// A size of tiles.
+struct Size {
+    /// px.
+    side: usize,
+    /// Shorter side of the smallest picture that is cut up so, px.
+    shortest: usize,
+    /// Slowest picture, by the median of its speeds, px/frame.
+    slowest: f64,
+    /// Most tiles used: beyond them the model, not the number of tiles, limits what is found.
+    most: usize,
+}
+
+/// Sizes, the greatest first: zeros of a blur of over half a tile run into each other.
+const SIZES: [Size; 4] = [
+    Size { side: 128, shortest: 288, slowest: 20.0, most: 28 },
+    Size { side: 64, shortest: 256, slowest: 0.0, most: 100 },
+    Size { side: 48, shortest: 96, slowest: 0.0, most: 100 },
+    Size { side: 32, shortest: 32, slowest: 0.0, most: 100 },
+];
+
+/// Every so many px in both directions the speed is looked at for the median.
+const STRIDE: usize = 8;
 
 /// Tiles from which smaller ones, which tell less each, are not tried.
 const ENOUGH_TILES: usize = 12;
@@ -41,12 +59,13 @@ pub(super) fn choose_tiles<T: Real>(
 ) -> Result<Option<(Waves, Vec<Tile>)>> {
     let (height, width) = frames[0].image.dim();
     let mut best: Option<(Waves, Vec<Tile>)> = None;
-    for (side, shortest) in SIDES {
-        if height.min(width) < shortest {
+    let speed = median_speed(frames);
+    for size in SIZES {
+        if height.min(width) < size.shortest || !(speed >= size.slowest) {
             continue;
         }
-        let waves = Waves::new(side);
-        let tiles = tiles_of(frames, &waves, noise, least_speed, random, control)?;
+        let waves = Waves::new(size.side);
+        let tiles = tiles_of(frames, &waves, size.most, (noise, least_speed), random, control)?;
         if tiles.len() > best.as_ref().map_or(0, |(_, most)| most.len()) {
             best = Some((waves, tiles));
         }
@@ -57,12 +76,25 @@ pub(super) fn choose_tiles<T: Real>(
     Ok(best)
 }
 
-/// At most [`MOST_TILES`] tiles faster than `least_speed` (px/frame) that tell something.
+/// Median of the known speeds, px/frame; 0 if none is known.
+fn median_speed<T: Real>(frames: &[ExposureFrame<'_, T>]) -> f64 {
+    let mut speeds: Vec<f64> = Vec::new();
+    for frame in frames {
+        let [u, v] = [&frame.velocity.u, &frame.velocity.v]
+            .map(|field| field.slice(s![..;STRIDE, ..;STRIDE]));
+        let known = u.iter().zip(&v).map(|(u, v)| u.as_f64().hypot(v.as_f64()));
+        speeds.extend(known.filter(|speed| speed.is_finite()));
+    }
+    speeds.sort_unstable_by(f64::total_cmp);
+    speeds.get(speeds.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// At most `most` tiles faster than `least_speed` (px/frame) that tell something.
 fn tiles_of<T: Real>(
     frames: &[ExposureFrame<'_, T>],
     waves: &Waves,
-    noise: f64,
-    least_speed: f64,
+    most: usize,
+    (noise, least_speed): (f64, f64),
     random: &mut Random,
     control: &Control,
 ) -> Result<Vec<Tile>> {
@@ -86,12 +118,12 @@ fn tiles_of<T: Real>(
             })
             .collect::<Result<_>>()?;
         tiles.extend(found.into_iter().flatten());
-        if tiles.iter().filter(|tile| tile.contrast > STRONG).count() >= MOST_TILES {
+        if tiles.iter().filter(|tile| tile.contrast > STRONG).count() >= most {
             break;
         }
     }
     keep_strong(&mut tiles);
-    tiles.truncate(MOST_TILES);
+    tiles.truncate(most);
     Ok(tiles)
 }
 
@@ -112,6 +144,7 @@ mod tests {
             velocity: [9.0, 0.0],
             speed: 9.0,
             points: Vec::new(),
+            strain: 0.0,
             power: Vec::new(),
             contrast,
         };

@@ -1,9 +1,12 @@
 //! The likelihood of every tile over one grid of scales.
 
+use std::borrow::Borrow;
+
 use rayon::prelude::*;
 
-use super::likelihood::{SceneSpectra, curves};
+use super::likelihood::curves;
 use super::path_spectrum::PathSpectrum;
+use super::scene::{SceneSpectra, least_of_kinds};
 use super::tile::{Tile, Waves};
 use crate::control::Control;
 use crate::error::Result;
@@ -21,10 +24,11 @@ pub(super) struct TileLikelihoods<'a> {
 }
 
 impl<'a> TileLikelihoods<'a> {
-    /// For `tiles` and scales up to `most_scale`.
+    /// For `tiles` and scales up to `most_scale`, and scenes of decays `alpha`.
     pub(super) fn new(
         tiles: &[Tile],
         waves: &'a Waves,
+        alpha: [f64; 2],
         most_scale: f64,
         noise: f64,
         control: &'a Control,
@@ -34,17 +38,31 @@ impl<'a> TileLikelihoods<'a> {
         let greatest =
             points.map(|p| f64::from(p.curvature[0].hypot(p.curvature[1]))).fold(0.0, f64::max);
         let table = PathSpectrum::new(greatest * most_scale.powi(2) * GREATEST_FREQUENCY);
-        let scenes = SceneSpectra::new(waves);
+        let scenes = SceneSpectra::new(waves, alpha);
         Ok(Self { waves, scenes, table, noise, control })
     }
 
-    /// -log L of each tile for every shape (outer) and scale (inner).
-    pub(super) fn curves(&self, tiles: &[Tile], log_scales: &[f64]) -> Result<Vec<Vec<f64>>> {
+    /// -log L of each tile for every kind of scene and at last for any (outer) and scale (inner).
+    pub(super) fn curves<T: Borrow<Tile> + Sync>(
+        &self,
+        tiles: &[T],
+        log_scales: &[f64],
+    ) -> Result<Vec<Vec<f64>>> {
+        let of_shapes = self.of_shapes(tiles, log_scales)?;
+        Ok(of_shapes.iter().map(|curves| least_of_kinds(curves, log_scales.len())).collect())
+    }
+
+    /// -log L of each tile for every shape of the scene's spectrum (outer) and scale (inner).
+    pub(super) fn of_shapes<T: Borrow<Tile> + Sync>(
+        &self,
+        tiles: &[T],
+        log_scales: &[f64],
+    ) -> Result<Vec<Vec<f64>>> {
         let scales: Vec<f64> = log_scales.iter().map(|s| s.exp()).collect();
         self.control.expect(tiles.len());
-        let of_tile = |tile: &Tile| {
+        let of_tile = |tile: &T| {
             self.control.advance()?;
-            Ok(curves(tile, self.waves, &self.scenes, &self.table, &scales, self.noise))
+            Ok(curves(tile.borrow(), self.waves, &self.scenes, &self.table, &scales, self.noise))
         };
         tiles.par_iter().map(of_tile).collect()
     }

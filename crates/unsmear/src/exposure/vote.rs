@@ -1,24 +1,24 @@
 //! From likelihoods of tiles to one length and the trust in it.
 //!
-//! The tiles' curves are summed for each shape of the scene's spectrum; the shape and scale of the least sum win, a
-//! parabola through three points on a logarithmic axis puts the scale between its samples. Two numbers tell how far
+//! The tiles' curves, each the least over shapes of the scene's spectrum (`scene.rs`), are summed; the scale of the least
+//! sum wins, a parabola through three points on a logarithmic axis puts it between its samples. Two numbers tell how far
 //! to trust it:
 //!
 //! ```text
-//! vote    share of the shapes whose own optimum is within 12 % of the winner's, of those that explain the tiles nearly as
-//!         well: -log L at most .02 per sample above the winner's
+//! vote    share of the kinds of scene whose own optimum is within 12 % of it, of those that explain the tiles nearly as
+//!         well as the best: -log L at most .02 per sample above
 //! spread  deviation of log s over resamplings of the tiles with replacement (bootstrap, fixed seed)
 //! ```
 //!
 //! (B. Efron, Ann. Statist. 7 (1979) 1-26, doi:10.1214/aos/1176344552).
 
-use super::likelihood::SHAPES;
 use super::random::Random;
+use super::scene::KINDS;
 
-/// Distance from the winner within which a shape agrees, in log s.
+/// Distance from the winner within which a kind agrees, in log s.
 const AGREEMENT: f64 = 0.12;
 
-/// How much worse than the winner, in -log L per sample, a shape may be that has a vote: half as much noise again as
+/// How much worse than the best, in -log L per sample, a kind may be that has a vote: half as much noise again as
 /// there is costs .04 where blur leaves little else.
 const PLAUSIBLE: f64 = 0.02;
 
@@ -28,55 +28,65 @@ const MIDDLE_DEVIATIONS: f64 = 2.563;
 /// Resamplings of the tiles.
 const RESAMPLINGS: usize = 30;
 
-/// A winner among shapes and scales.
+/// The scale that explains tiles best.
 pub(super) struct Optimum {
-    /// Log of the scale.
+    /// Its log.
     pub(super) log_scale: f64,
-    /// Whether the optimum lies within the range, not at its end.
+    /// Whether it lies within the range, not at its end.
     pub(super) inside: bool,
-    /// Own optimum of each shape, log of the scale.
-    pub(super) of_shapes: [f64; SHAPES],
+    /// Own optimum of each kind of scene, log of the scale.
+    pub(super) of_kinds: [f64; KINDS],
     /// -log L there.
-    pub(super) leasts: [f64; SHAPES],
+    pub(super) leasts: [f64; KINDS],
 }
 
-/// The optimum of curves (shapes, scales) summed over `tiles`.
+/// The optimum of curves (kinds and any, scales) summed over `tiles`.
 pub(super) fn optimum<'a>(tiles: impl Iterator<Item = &'a [f64]>, log_scales: &[f64]) -> Optimum {
     let n = log_scales.len();
-    let mut sum = vec![0.0; SHAPES * n];
+    let mut sum = vec![0.0; (KINDS + 1) * n];
     for curve in tiles {
         sum.iter_mut().zip(curve).for_each(|(sum, value)| *sum += value);
     }
-    let (mut of_shapes, mut leasts) = ([0.0; SHAPES], [0.0; SHAPES]);
-    let (mut best, mut shape, mut inside) = (f64::INFINITY, 0, false);
-    for (number, curve) in sum.chunks(n).enumerate() {
-        let least = (0..n).fold(0, |least, i| if curve[i] < curve[least] { i } else { least });
-        of_shapes[number] = parabola(curve, log_scales, least);
-        leasts[number] = curve[least];
-        if curve[least] < best {
-            (best, shape, inside) = (curve[least], number, least > 0 && least + 1 < n);
-        }
+    let (of_kinds, any) = sum.split_at(KINDS * n);
+    let (log_scale, at) = parabola(any, log_scales);
+    let kinds: Vec<(f64, usize)> =
+        of_kinds.chunks(n).map(|curve| parabola(curve, log_scales)).collect();
+    Optimum {
+        log_scale,
+        inside: at > 0 && at + 1 < n,
+        of_kinds: std::array::from_fn(|kind| kinds[kind].0),
+        leasts: std::array::from_fn(|kind| of_kinds[kind * n + kinds[kind].1]),
     }
-    Optimum { log_scale: of_shapes[shape], inside, of_shapes, leasts }
 }
 
-/// Least of the parabola through the sample `least` and its neighbours, equally spaced.
-fn parabola(curve: &[f64], log_scales: &[f64], least: usize) -> f64 {
+/// The curves of `tiles` for any kind of scene, summed, at `n` scales.
+pub(super) fn sum<'a>(tiles: impl Iterator<Item = &'a [f64]>, n: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; n];
+    for curve in tiles {
+        sum.iter_mut().zip(&curve[KINDS * n..]).for_each(|(sum, value)| *sum += value);
+    }
+    sum
+}
+
+/// Least of the parabola through the least sample and its neighbours, equally spaced, and the number of that sample.
+pub(super) fn parabola(curve: &[f64], log_scales: &[f64]) -> (f64, usize) {
+    let least = (0..curve.len()).fold(0, |at, i| if curve[i] < curve[at] { i } else { at });
     if least == 0 || least + 1 == curve.len() {
-        return log_scales[least];
+        return (log_scales[least], least);
     }
     let (before, at, after) = (curve[least - 1], curve[least], curve[least + 1]);
     let bend = before - 2.0 * at + after;
     let offset = if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
-    log_scales[least] + offset.clamp(-0.5, 0.5) * (log_scales[least + 1] - log_scales[least])
+    let step = log_scales[least + 1] - log_scales[least];
+    (log_scales[least] + offset.clamp(-0.5, 0.5) * step, least)
 }
 
-/// Share of the plausible shapes that agree with `log_scale`, of `samples` waves of tiles.
-pub(super) fn vote(found: &Optimum, log_scale: f64, samples: usize) -> f64 {
+/// Share of the plausible kinds that agree with the optimum of any, of `samples` waves of tiles.
+pub(super) fn vote(found: &Optimum, samples: usize) -> f64 {
     let best = found.leasts.iter().copied().fold(f64::INFINITY, f64::min);
     let limit = best + PLAUSIBLE * samples as f64;
-    let plausible = found.of_shapes.iter().zip(&found.leasts).filter(|(_, least)| **least <= limit);
-    let agree = plausible.clone().filter(|(own, _)| (**own - log_scale).abs() <= AGREEMENT);
+    let plausible = found.of_kinds.iter().zip(&found.leasts).filter(|(_, least)| **least <= limit);
+    let agree = plausible.clone().filter(|(own, _)| (**own - found.log_scale).abs() <= AGREEMENT);
     agree.count() as f64 / plausible.count() as f64
 }
 
@@ -86,7 +96,7 @@ pub(super) fn spread(tiles: &[&[f64]], log_scales: &[f64], random: &mut Random) 
     let mut found: Vec<f64> = (0..RESAMPLINGS)
         .map(|_| {
             let drawn = (0..tiles.len()).map(|_| tiles[random.below(tiles.len())]);
-            optimum(drawn, log_scales).log_scale
+            parabola(&sum(drawn, log_scales.len()), log_scales).0
         })
         .collect();
     found.sort_unstable_by(f64::total_cmp);
@@ -98,9 +108,9 @@ pub(super) fn spread(tiles: &[&[f64]], log_scales: &[f64], random: &mut Random) 
 mod tests {
     use super::*;
 
-    /// Curves of tiles whose optima lie at `at`, the same for all shapes.
+    /// Curves of tiles whose optima lie at `at`, the same for all kinds.
     fn tile(at: f64, log_scales: &[f64]) -> Vec<f64> {
-        (0..SHAPES).flat_map(|_| log_scales.iter().map(move |s| (s - at).powi(2))).collect()
+        (0..=KINDS).flat_map(|_| log_scales.iter().map(move |s| (s - at).powi(2))).collect()
     }
 
     #[test]
@@ -109,13 +119,13 @@ mod tests {
         let tiles = [tile(0.1, &log_scales), tile(0.17, &log_scales)];
         let found = optimum(tiles.iter().map(Vec::as_slice), &log_scales);
         assert!((found.log_scale - 0.135).abs() < 1e-12 && found.inside);
-        assert_eq!(vote(&found, found.log_scale, 100), 1.0);
-        // Half of the shapes say something else, at first as well as the others, then worse than .02 per sample.
-        let mut divided = Optimum { leasts: [0.0; SHAPES], ..found };
-        divided.of_shapes[..SHAPES / 2].fill(1.0);
-        assert_eq!(vote(&divided, divided.log_scale, 100), 0.5);
-        divided.leasts[..SHAPES / 2].fill(2.1);
-        assert_eq!(vote(&divided, divided.log_scale, 100), 1.0);
+        assert_eq!(vote(&found, 100), 1.0);
+        // Half of the kinds say something else, at first as well as the others, then worse than .02 per sample.
+        let mut divided = Optimum { leasts: [0.0; KINDS], ..found };
+        divided.of_kinds[..KINDS / 2].fill(1.0);
+        assert_eq!(vote(&divided, 100), 0.5);
+        divided.leasts[..KINDS / 2].fill(2.1);
+        assert_eq!(vote(&divided, 100), 1.0);
         let views: Vec<&[f64]> = tiles.iter().map(Vec::as_slice).collect();
         let spread = spread(&views, &log_scales, &mut Random::new(1));
         // Two draws of two values 0.07 apart: the same one twice in half of the cases, so the middle 80 % span 0.07.
