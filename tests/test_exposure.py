@@ -76,6 +76,39 @@ def test_small_motion_is_said_to_be_small(clip: synthetic.Sequence) -> None:
     assert found.report()["vote"] is None
 
 
+@pytest.mark.parametrize(("length", "side"), [(22.0, 240), (30.0, 290), (60.0, 340)])
+def test_long_blur_is_read_to_a_hundredth(length: float, side: int) -> None:
+    """In small tiles, in those of large motion, and nearly half of one of those."""
+    texture = synthetic.texture((side + 90, side + 90), seed=5)
+    velocity = (0.8 * length, 0.6 * length)
+    clip = synthetic.translation(
+        texture, velocity, shape=(side, side), exposure=1.0, n_frames=1, noise=1.0
+    )
+    found = unsmear.estimate_exposure(clip.blurred[0], clip.velocity[0])
+    assert found.status == "ok"
+    # The window leaks between zeros 240/22 or 340/60 px apart: a leakage wrong by a
+    # tenth moves the optimum by 2 %.
+    assert found.value == pytest.approx(1.0, rel=0.01)
+
+
+def test_blur_too_long_for_the_picture_is_not_said_to_be_found() -> None:
+    texture = synthetic.texture((300, 300), seed=5)
+    clip = synthetic.translation(
+        texture, (36.0, 27.0), shape=(200, 200), exposure=1.0, n_frames=1, noise=1.0
+    )
+    found = unsmear.estimate_exposure(clip.blurred[0], clip.velocity[0])
+    assert found.status == "unsure"
+
+
+def test_a_strong_turn_is_not_said_to_be_found() -> None:
+    """A wave turned by 25 degrees while it is recorded fills the zeros."""
+    picture = synthetic.texture((400, 400), seed=5)
+    case = synthetic.blur_case("R25", picture, shape=(200, 200), noise=1.0)
+    bend = case.acceleration
+    found = unsmear.estimate_exposure(case.blurred, case.velocity, acceleration=bend)
+    assert found.status == "unsure"
+
+
 def test_deblur_takes_the_blur_from_the_picture(clip: synthetic.Sequence) -> None:
     given = unsmear.deblur(clip.blurred[0], clip.velocity[0], exposure=0.8)
     found = unsmear.deblur(clip.blurred[0], 1.4 * clip.velocity[0], exposure="auto")

@@ -137,8 +137,8 @@ def estimate_exposure(
 
     for the best of :math:`\alpha \in \{2.5, 3.5\}, \tau \in \{0, .2, .5\}, m \in \{1,
     1.5\}` in each tile, and the tile's own c in each of twelve sectors of directions.
-    It needs blur between 2.4 and about 70 px (35 in pictures of less than 288 px), turns
-    of up to 15 degrees, and pictures not sharpened after they were blurred.
+    It needs blur between 2.4 and about 70 px (35 in pictures of less than 288 px),
+    turns of up to 15 degrees, and pictures not sharpened after they were blurred.
 
     References
     ----------

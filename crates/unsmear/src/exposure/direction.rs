@@ -13,8 +13,9 @@
 use super::random::Random;
 use super::scene::{ALPHA, KINDS};
 use super::search::{LEAST_BLUR, LONGEST_BLUR};
-use super::tile::{Tile, Waves};
+use super::tile::Tile;
 use super::tile_likelihoods::TileLikelihoods;
+use super::waves::Waves;
 use crate::control::Control;
 use crate::error::Result;
 

@@ -34,7 +34,8 @@ use multiversion::multiversion;
 
 use super::path_spectrum::PathSpectrum;
 use super::scene::{SHAPES, SceneSpectra};
-use super::tile::{SECTORS, Tile, Waves};
+use super::tile::Tile;
+use super::waves::{SECTORS, Waves};
 
 /// Least share of the texture's power that passes any zero: no model of a path is exact.
 const LEAST_PASS: f64 = 1e-6;
@@ -252,6 +253,18 @@ mod tests {
             let values = curves(&tile, &waves, &scenes, &table, &scales, noise);
             let curve = &values[scene * scales.len()..][..scales.len()];
             assert!(curve.iter().all(|&value| value >= curve[2]), "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn leakage_is_the_autocorrelation_of_the_window() {
+        for i in 0..=50 {
+            let x = f64::from(i) / 100.0;
+            let cosine = |(weight, bins): (f64, f64)| weight * (TAU * bins * x).cos();
+            let stands: f64 = LEAKAGE.map(cosine).iter().sum();
+            let rho = (1.0 - x) * (2.0 + (TAU * x).cos()) / 3.0 + (TAU * x).sin() / TAU;
+            // As near as three waves come up to a lag of half a tile.
+            assert!((stands - rho).abs() < 0.011, "{x}: {stands} {rho}");
         }
     }
 

@@ -38,6 +38,7 @@ mod tile;
 mod tile_choice;
 mod tile_likelihoods;
 mod vote;
+mod waves;
 
 use self::direction::TurnSearch;
 pub use self::frame::ExposureFrame;

@@ -10,7 +10,7 @@
 //! the shape that suits it best at every length of blur. How far the answer hangs on this freedom is asked of the
 //! [`KINDS`]: all tiles with one alpha, or with one tau, under either noise.
 
-use super::tile::Waves;
+use super::waves::Waves;
 
 /// Decays of the scene's power spectrum.
 pub(super) const ALPHA: [f64; 2] = [2.5, 3.5];

@@ -3,9 +3,10 @@
 use super::random::Random;
 use super::scene::{ALPHA, KINDS};
 use super::short_blur::by_dimming;
-use super::tile::{Tile, Waves};
+use super::tile::Tile;
 use super::tile_likelihoods::TileLikelihoods;
 use super::vote::{Optimum, optimum, parabola, spread, sum, vote};
+use super::waves::Waves;
 use crate::control::Control;
 use crate::error::Result;
 

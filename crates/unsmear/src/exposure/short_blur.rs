@@ -13,9 +13,10 @@
 //! the harm of a mistake down: blur assumed too long costs several times what blur assumed too short does.
 
 use super::scene::SHAPES;
-use super::tile::{Tile, Waves};
+use super::tile::Tile;
 use super::tile_likelihoods::TileLikelihoods;
 use super::vote::parabola;
+use super::waves::Waves;
 use crate::control::Control;
 use crate::error::Result;
 

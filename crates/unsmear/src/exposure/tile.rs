@@ -2,25 +2,18 @@
 //!
 //! A tile of T x T px under a Hann window of mean square 1 has the periodogram P(w) = |DFT|^2 / T^2, whose mean for
 //! white noise of deviation sigma is sigma^2. Its motion is sampled at nine points, weighted as the window does, as
-//! means over squares of T/5: blur that varies over the tile smears the zeros of its spectrum. Dropped are tiles with unknown pixels, with more than a tenth unknown motion, whose motion varies by more
-//! than 0.35 of itself, and those without contrast.
+//! means over squares of T/5: blur that varies over the tile smears the zeros of its spectrum. Dropped are tiles with
+//! unknown pixels, with more than a tenth unknown motion, whose motion varies by more than 0.35 of itself, and those
+//! without contrast.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use ndarray::{ArrayView2, s};
 
 use super::frame::ExposureFrame;
+use super::waves::{GREATEST, Waves};
 use crate::fourier::{Complex64, Fft2};
 use crate::real::Real;
-
-/// Least frequency used, in steps of the tile's transform: below it the window's main lobe brings in the mean.
-const LEAST_STEPS: f64 = 2.5;
-
-/// Greatest frequency used, rad/px: beyond it cameras, codecs and demosaicking shape the spectrum.
-const GREATEST: f64 = 2.7;
-
-/// Sectors of directions, in each of which a scene has a strength of its own.
-pub(super) const SECTORS: usize = 12;
 
 /// Greatest spread of a tile's motion, as a share of its length.
 const GREATEST_SPREAD: f64 = 0.35;
@@ -40,63 +33,6 @@ const GREATEST_PHASE: f64 = 0.2;
 
 /// Number of points.
 pub(super) const POINTS: usize = NODES.len() * NODES.len();
-
-/// The waves at which tiles of one size are compared, by direction: half a plane, for a picture's spectrum is symmetric.
-#[derive(Clone)]
-pub(super) struct Waves {
-    /// Side T of the tiles, px.
-    pub(super) side: usize,
-    /// Frequency to the right, rad/px.
-    pub(super) x: Vec<f32>,
-    /// Frequency downwards, rad/px.
-    pub(super) y: Vec<f32>,
-    /// Ends of the sectors of directions, in which the waves lie one after the other.
-    pub(super) sectors: Vec<usize>,
-    bins: Vec<usize>,
-}
-
-impl Waves {
-    pub(super) fn new(side: usize) -> Self {
-        let frequency = |k: usize| {
-            let signed = if k > side / 2 { k as f64 - side as f64 } else { k as f64 };
-            TAU * signed / side as f64
-        };
-        let least = LEAST_STEPS * TAU / side as f64;
-        let mut of_sectors = vec![Vec::new(); SECTORS];
-        for bin in 0..side * side {
-            let (y, x) = (frequency(bin / side), frequency(bin % side));
-            let radius = x.hypot(y);
-            if radius > least && radius < GREATEST && (y > 0.0 || (y == 0.0 && x > 0.0)) {
-                // The first sector lies about the x axis: on both ends of the half plane.
-                let sector = (y.atan2(x) / PI * SECTORS as f64 + 0.5) as usize % SECTORS;
-                of_sectors[sector].push((bin, x as f32, y as f32));
-            }
-        }
-        let mut end = 0;
-        let ends = of_sectors.iter().map(|sector| {
-            end += sector.len();
-            end
-        });
-        let sectors = ends.collect();
-        let waves = of_sectors.concat();
-        Self {
-            side,
-            x: waves.iter().map(|w| w.1).collect(),
-            y: waves.iter().map(|w| w.2).collect(),
-            sectors,
-            bins: waves.iter().map(|w| w.0).collect(),
-        }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.bins.len()
-    }
-
-    /// The same with one sector of all directions.
-    pub(super) fn isotropic(&self) -> Self {
-        Self { sectors: vec![self.len()], ..self.clone() }
-    }
-}
 
 /// Motion at one point of a tile.
 #[derive(Debug, Clone, Copy)]
@@ -251,6 +187,29 @@ mod tests {
 
     fn field(u: f64, v: f64) -> FlowField<f64> {
         FlowField::new(Array2::from_elem((64, 64), u), Array2::from_elem((64, 64), v)).unwrap()
+    }
+
+    #[test]
+    fn strain_is_how_the_motion_differs() {
+        let image = Array2::from_shape_fn((64, 64), |(y, x)| ((y * 31 + x * 17) % 23) as f64);
+        // A turn by 0.1 rad about a point to the left, and the same everywhere.
+        let turning = FlowField::new(
+            Array2::from_shape_fn((64, 64), |(y, _)| -0.1 * y as f64),
+            Array2::from_shape_fn((64, 64), |(_, x)| 0.1 * (x as f64 + 100.0)),
+        )
+        .unwrap();
+        let (waves, plan, still) = (Waves::new(64), Fft2::new(64, 64), field(0.0, 0.0));
+        let tile = |velocity: &FlowField<f64>| {
+            let (velocity, curvature) = (velocity.view(), still.view());
+            let frame = ExposureFrame { image: image.view(), velocity, curvature };
+            Tile::new(&frame, [0, 0], &waves, 0.3, &plan).unwrap()
+        };
+        let turned = tile(&turning);
+        // The points are means over whole pixels.
+        assert!((turned.strain - 0.1).abs() < 0.01, "{}", turned.strain);
+        assert_eq!(turned.points.len(), POINTS);
+        let even = tile(&field(3.0, 4.0));
+        assert_eq!((even.strain, even.points.len()), (0.0, 1));
     }
 
     #[test]

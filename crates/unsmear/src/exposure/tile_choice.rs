@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::frame::ExposureFrame;
 use super::random::Random;
-use super::tile::{Tile, Waves};
+use super::tile::Tile;
+use super::waves::Waves;
 use crate::control::Control;
 use crate::error::Result;
 use crate::fourier::Fft2;

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use super::likelihood::curves;
 use super::path_spectrum::PathSpectrum;
 use super::scene::{SceneSpectra, least_of_kinds};
-use super::tile::{Tile, Waves};
+use super::tile::Tile;
+use super::waves::Waves;
 use crate::control::Control;
 use crate::error::Result;
 
