@@ -37,13 +37,15 @@
 //! | 10 | [`flow::least_squares`], [`flow::fleet_jepson`], [`flow::thesis`] | the flow methods |
 //! | 11 | [`psf`], `streamline`, `local_spline`, [`noise`] | kernels and paths of motion; sampling; noise |
 //! | 12 | [`blur`] | the forward operator |
-//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random`, `exposure::short_blur` | parts of the search for the exposure |
-//! | 13 | `exposure::tile` | |
+//! | 11 | `exposure::waves` | parts of the search for the exposure |
+//! | 12 | `exposure::frame`, `exposure::path_spectrum`, `exposure::random`, `exposure::scene` | |
+//! | 13 | `exposure::tile`, `exposure::vote` | |
 //! | 14 | `exposure::tile_choice`, `exposure::likelihood` | |
-//! | 15 | `exposure::vote`, `exposure::tile_likelihoods` | |
-//! | 16 | `exposure::search` | |
-//! | 17 | `exposure::direction` | |
-//! | 18 | [`exposure`] | how long the shutter was open |
+//! | 15 | `exposure::tile_likelihoods` | |
+//! | 16 | `exposure::short_blur` | |
+//! | 17 | `exposure::search` | |
+//! | 18 | `exposure::direction` | |
+//! | 19 | [`exposure`] | how long the shutter was open |
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
 //! | 3 | `motion_operator::lanes`, `motion_operator::bands`, `motion_operator::spline_inverse`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
 //! | 4 | `motion_operator::record`, `motion_operator::strands`, `motion_operator::stencil` | |
