@@ -109,6 +109,28 @@ def test_a_strong_turn_is_not_said_to_be_found() -> None:
     assert found.status == "unsure"
 
 
+def test_a_small_fast_thing_before_a_still_scene_is_read() -> None:
+    """It covers a twentieth of the picture: four tiles see it alone."""
+    moving = synthetic.translation(
+        synthetic.texture((500, 500), seed=5),
+        (9.0, 3.0),
+        shape=(240, 240),
+        exposure=1.0,
+        n_frames=1,
+        noise=1.0,
+    )
+    picture = synthetic.texture((240, 240), seed=3)
+    velocity = np.zeros((240, 240, 2), np.float32)
+    thing = (slice(80, 130), slice(96, 150))
+    picture[thing] = moving.blurred[0][thing]
+    velocity[thing] = (9.0, 3.0)
+    found = unsmear.estimate_exposure(
+        picture, velocity, limits=(0.06, 1.25), turn=False, noise=1.0 / 255
+    )
+    assert found.status == "ok"
+    assert found.value == pytest.approx(1.0, rel=0.02)
+
+
 def test_deblur_takes_the_blur_from_the_picture(clip: synthetic.Sequence) -> None:
     given = unsmear.deblur(clip.blurred[0], clip.velocity[0], exposure=0.8)
     found = unsmear.deblur(clip.blurred[0], 1.4 * clip.velocity[0], exposure="auto")

@@ -67,6 +67,9 @@ const MOST_UNSURE: f64 = 1.0;
 /// Speed whose 95 % quantile below it explains that no tile tells anything, px/frame.
 const SMALL: f64 = 3.0;
 
+/// Mean speed of tiles below which a few of them tell zeros by chance, px/frame: not a fast thing before a still scene.
+const SMALL_TILES: f64 = 4.0;
+
 /// Parameters of the search; see the [module](self).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExposureSearch {
@@ -148,6 +151,7 @@ impl ExposureSearch {
             let mut found = search(&tiles, &waves, beyond, noise, &mut random, control)?;
             if let Evidence::Zeros(zeros) = &found
                 && small
+                && zeros.speed < SMALL_TILES
                 && !(self.trusts(zeros) && zeros.tiles >= ENOUGH_TILES)
             {
                 let share = by_dimming(&tiles, &waves, &first_grid(beyond), noise, control)?;

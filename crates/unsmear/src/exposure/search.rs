@@ -53,6 +53,8 @@ pub(super) struct Found {
     pub(super) spread: f64,
     /// Tiles used.
     pub(super) tiles: usize,
+    /// Their mean speed, px/frame.
+    pub(super) speed: f64,
 }
 
 /// What there is to learn from tiles.
@@ -93,7 +95,15 @@ pub(super) fn search(
     let Optimum { log_scale, mut inside, of_kinds, .. } = found;
     let speed = tiles.iter().map(|tile| tile.speed).sum::<f64>() / tiles.len() as f64;
     inside &= speed * log_scale.exp() < LONGEST_READ * side as f64;
-    Ok(Evidence::Zeros(Found { log_scale, inside, of_kinds, vote, spread, tiles: tiles.len() }))
+    Ok(Evidence::Zeros(Found {
+        log_scale,
+        inside,
+        of_kinds,
+        vote,
+        spread,
+        tiles: tiles.len(),
+        speed,
+    }))
 }
 
 /// The part of `range` at which the blur of some tile fits it.
