@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,8 @@ def test_ratios_and_the_search_decide(
             return frame(ratios[self.exposure], self.exposure)
 
     monkeypatch.setattr(module, "Chain", Chain)
-    source: Any = None
-    others = Alternatives(source, lambda index: np.zeros(index), SETTINGS)
+    source: Any = SimpleNamespace(guide=None)
+    others = Alternatives(source, SETTINGS)
     own: Any = Chain(None, None, Settings(1.0, None, "balanced", {}, 1, 0))
     best, chain = others.best(0, frame(ratios[1.0], 1.0, likeliest), own)
     assert best.report["exposure"] == expected
@@ -70,8 +71,8 @@ def test_ratios_and_the_search_decide(
 
 
 def test_of_short_blur_twins_know_nothing() -> None:
-    source: Any = None
-    others = Alternatives(source, lambda index: np.zeros(index), SETTINGS)
+    source: Any = SimpleNamespace(guide=None)
+    others = Alternatives(source, SETTINGS)
     result, chain = frame(0.9, 0.6, 0.7, blur=2.0), object()
     own: Any = chain
     # No other exposure is tried: there is no clip to try it on.

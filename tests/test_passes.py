@@ -54,8 +54,7 @@ def chains(monkeypatch: pytest.MonkeyPatch) -> type[FakeChain]:
 
 def passes() -> Passes:
     frames = np.arange(2 * 4 * 5, dtype=np.uint8).reshape(2, *SHAPE)
-    source = Source(frames, None)
-    return Passes(source, lambda index: frames[index], SETTINGS)
+    return Passes(Source(frames, None), SETTINGS)
 
 
 @pytest.mark.parametrize(

@@ -177,12 +177,8 @@ def restored_frames(
     Keeps what a window of about twenty frames needs, however long the clip is.
     """
 
-    def as_given(index: int) -> NDArray[Any]:
-        frame = source.frame(index)
-        return frame[..., 0] if frame.shape[-1] == 1 else frame
-
-    passes = Passes(source, as_given, settings)
-    others = Alternatives(source, as_given, settings)
+    passes = Passes(source, settings)
+    others = Alternatives(source, settings)
     for index in wanted:
         result, chain, number = passes.best(index, second_pass)
         if result.report["exposure_status"] == "unsure" and result.changed.any():
@@ -197,7 +193,9 @@ def restored_frames(
             "seed": settings.seed,
             "version": _unsmear.__version__,
         }
-        yield picture, chain.motion.motion(index).velocity, report
+        velocity = chain.motion.motion(index).velocity.copy()
+        source.bars(index).hide(np.moveaxis(velocity, -1, 0))
+        yield picture, velocity, report
         passes.forget_before(index)
         others.forget_before(index)
 

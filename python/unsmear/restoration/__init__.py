@@ -3,6 +3,7 @@
 | module         | step                                                            |
 |----------------|-----------------------------------------------------------------|
 | source         | frames in grey levels                                           |
+| bars           | black rows and columns that are no picture                      |
 | sampling       | pictures and fields between pixels                              |
 | looks          | what the solver takes                                           |
 | clip_motion    | velocity and acceleration of every frame                        |

@@ -46,11 +46,9 @@ class Alternatives:
     def __init__(
         self,
         source: Source,
-        guide: Callable[[int], NDArray[Any]],
         settings: Settings,
     ) -> None:
         self._source = source
-        self._guide = guide
         self._settings = settings
         self._chains: dict[float, Chain] = {}
 
@@ -89,7 +87,7 @@ class Alternatives:
             if len(self._chains) >= MOST_CHAINS:
                 self._chains.pop(next(iter(self._chains)))
             settings = replace(self._settings, exposure=exposure)
-            self._chains[exposure] = Chain(self._source, self._guide, settings)
+            self._chains[exposure] = Chain(self._source, self._source.guide, settings)
         return self._chains[exposure]
 
     def forget_before(self, index: int) -> None:

@@ -51,8 +51,6 @@ class Passes:
     ----------
     source : Source
         The clip.
-    as_given : callable
-        Returns a frame as it came, (H, W[, C]).
     settings : Settings
         Of the chain.
     """
@@ -60,11 +58,10 @@ class Passes:
     def __init__(
         self,
         source: Source,
-        as_given: Callable[[int], NDArray[Any]],
         settings: Settings,
     ) -> None:
         self._source = source
-        self._chains = [Chain(source, as_given, settings)]
+        self._chains = [Chain(source, source.guide, settings)]
         for _ in range(1, MOST_PASSES):
             guide = self._restored_by(self._chains[-1])
             self._chains.append(Chain(source, guide, settings))
@@ -90,7 +87,9 @@ class Passes:
             result = chain.restored(index)
             planes = result.planes
             if result.alone is not None and _promising(result):
-                planes = cropped(result.alone.picture, result.alone.pad)
+                # What was not recorded is made up, in bars out of nothing.
+                picture = cropped(result.alone.picture, result.alone.pad)
+                planes = np.where(np.isnan(result.planes), result.planes, picture)
             planes = planes / self._source.scale
             return planes[0] if len(planes) == 1 else np.moveaxis(planes, 0, -1)
 

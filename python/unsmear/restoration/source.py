@@ -19,6 +19,7 @@ from unsmear._arrays import (
     scale_of,
     to_dtype_of,
 )
+from unsmear.restoration.bars import Bars, bars
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -109,9 +110,27 @@ class Source:
         return np.asarray(self._frames[index])
 
     def planes(self, index: int) -> NDArray[np.float32]:
-        """Return a frame's channels (C, H, W), grey levels; NaN = unknown."""
+        """Return a frame's channels (C, H, W), grey levels; NaN = unknown, or a bar."""
+        planes = self._recorded(index)
+        bars(planes).hide(planes)
+        return planes
+
+    def bars(self, index: int) -> Bars:
+        """Return the bars of a frame."""
+        return bars(self._recorded(index))
+
+    def _recorded(self, index: int) -> NDArray[np.float32]:
         grey = np.moveaxis(np.asarray(self._frames[index], np.float64), -1, 0)
         return np.ascontiguousarray(grey * self.scale, np.float32)
+
+    def guide(self, index: int) -> NDArray[Any]:
+        """Return what flow is measured on: a frame as it came, bars NaN; (H, W[, C])."""
+        frame = self.frame(index)
+        hidden = self.bars(index)
+        if any(hidden):
+            frame = frame.astype(np.result_type(frame.dtype, np.float32))
+            hidden.hide(np.moveaxis(frame, -1, 0))
+        return frame[..., 0] if frame.shape[-1] == 1 else frame
 
     def luma(self, index: int) -> NDArray[np.float32]:
         """Return a frame's luma (H, W), grey levels."""
