@@ -176,7 +176,6 @@ def restored_frames(
 
     Keeps what a window of about twenty frames needs, however long the clip is.
     """
-
     passes = Passes(source, settings)
     others = Alternatives(source, settings)
     for index in wanted:
@@ -185,7 +184,9 @@ def restored_frames(
             result, chain = others.best(index, result, chain)
         result = chain.joined(index) if result.changed.any() else result
         picture = source.as_came(result.planes, index, result.changed)
+        hidden = source.bars(index)
         report = result.report | {
+            "bars": hidden._asdict(),
             "passes": number,
             "joint": settings.joint,
             "flow_method": settings.flow_method,
@@ -194,7 +195,7 @@ def restored_frames(
             "version": _unsmear.__version__,
         }
         velocity = chain.motion.motion(index).velocity.copy()
-        source.bars(index).hide(np.moveaxis(velocity, -1, 0))
+        hidden.hide(np.moveaxis(velocity, -1, 0))
         yield picture, velocity, report
         passes.forget_before(index)
         others.forget_before(index)

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from unsmear.restoration.chain import Chain
 from unsmear.restoration.clip_exposure import LIMITS, LONGEST
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
     from unsmear.restoration.records import Restored, Settings
     from unsmear.restoration.source import Source
 
-__all__ = ["Alternatives", "better"]
+__all__ = ["Alternatives"]
 
 ALTERNATIVES = (0.7, 1.4)
 """Exposures tried where the search was not sure, relative to the one assumed."""
@@ -26,11 +22,6 @@ AS_GOOD = 1.05
 LEAST_BLUR = 4.0
 """Blur (95 % quantile, px) from which twins tell exposures apart at all."""
 MOST_CHAINS = 4
-
-
-def better(second: Restored, first: Restored) -> bool:
-    """Return whether ``second`` agrees better with its twins, and changes anything."""
-    return bool(second.ratio < first.ratio) and bool(second.changed.any())
 
 
 class Alternatives:

@@ -196,7 +196,6 @@ class Chain:
         blur = exposure.value * np.linalg.norm(motion.velocity, axis=-1)
         report: dict[str, Any] = {
             "index": index,
-            "bars": self._source.bars(index)._asdict(),
             "exposure": exposure.value,
             "exposure_status": exposure.status,
             "exposure_found": {

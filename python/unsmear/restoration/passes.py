@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from unsmear.restoration.alternatives import better
 from unsmear.restoration.chain import KEPT_BEHIND, REACH, Chain
 from unsmear.restoration.looks import cropped
 
@@ -30,7 +29,7 @@ __all__ = ["Passes", "reach"]
 MOST_PASSES = 3
 UNSTEADY = 0.25
 """Acceleration relative to velocity from which a further pass is worth its time."""
-PROMISING = 1.1
+PROMISING = 1.3
 """Ratio of the verdict below which flow is measured on the restored frame, whether that
 is good enough to be shown or not."""
 
@@ -72,14 +71,17 @@ class Passes:
         ``again``: whether there is more than one pass; None: where motion is unsteady.
         """
         chain = self._chains[0]
-        result, passes = chain.restored(index), 1
+        result = last = chain.restored(index)
+        passes = 1
         if again is None:
             again = _promising(result) and chain.unsteadiness(index) > UNSTEADY
         for number, following in enumerate(self._chains[1:] if again else (), start=2):
-            other = following.restored(index)
-            if not better(other, result):
+            before, last = last, following.restored(index)
+            if not last.ratio < before.ratio:
                 break
-            result, chain, passes = other, following, number
+            # One that is not good enough to be shown may still guide one that is.
+            if last.changed.any():
+                result, chain, passes = last, following, number
         return result, chain, passes
 
     def _restored_by(self, chain: Chain) -> Callable[[int], NDArray[Any]]:

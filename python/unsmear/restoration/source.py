@@ -124,7 +124,7 @@ class Source:
         return np.ascontiguousarray(grey * self.scale, np.float32)
 
     def guide(self, index: int) -> NDArray[Any]:
-        """Return what flow is measured on: a frame as it came, bars NaN; (H, W[, C])."""
+        """Return what flow is measured on: a frame, bars NaN; (H, W[, C])."""
         frame = self.frame(index)
         hidden = self.bars(index)
         if any(hidden):
