@@ -8,6 +8,8 @@
 | looks          | what the solver takes                                           |
 | clip_motion    | velocity and acceleration of every frame                        |
 | clip_exposure  | exposure of every frame, smoothed in time                       |
+| clipping       | whether what is clipped was brighter than white                 |
+| walks          | every frame restored with growing strength of the prior         |
 | twin_frames    | how well a restored frame predicts its neighbours' restorations |
 | verdict        | what to use, where, in words                                    |
 | chain          | the order of the steps                                          |

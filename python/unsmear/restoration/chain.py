@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from unsmear import _unsmear
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.looks import (
@@ -21,9 +20,7 @@ from unsmear.restoration.looks import (
     SHARP_STRENGTH,
     TWIN,
     WALK,
-    Look,
     cropped,
-    look,
     walk,
 )
 from unsmear.restoration.memo import Memo
@@ -38,6 +35,7 @@ from unsmear.restoration.twin_frames import (
     twins,
 )
 from unsmear.restoration.verdict import judge
+from unsmear.restoration.walks import Walks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,18 +87,19 @@ class Chain:
             noise=settings.noise,
             seed=settings.seed,
         )
+        self._walks = Walks(source, self.motion, self._exposure, self._memo)
         neighbours = Neighbours(
             source,
             self.motion,
             self._exposure,
-            self._twin,
+            self._walks,
             method=settings.flow_method,
             options=settings.flow_options,
         )
         self._several = SeveralFrames(
             neighbours,
             self.restored,
-            lambda index: self._look(index, source.planes(index)),
+            self._walks.look,
             lambda index: self._exposure.exposure(index).noise,
             settings.joint // 2,
         )
@@ -130,32 +129,6 @@ class Chain:
         ]
         return medians[0] / max(medians[1], 1e-6)
 
-    def _look(self, index: int, planes: Planes) -> Look:
-        motion = self.motion.motion(index)
-        exposure = self._exposure.exposure(index).value
-        visible = _unsmear.visibility(motion.velocity, exposure)
-        return look(
-            planes,
-            motion.velocity,
-            motion.acceleration,
-            exposure,
-            visible,
-            ceiling=self._source.ceiling,
-        )
-
-    def _walk(self, index: int) -> tuple[list[Planes], int]:
-        """Return the frame's luma restored with every strength, padded."""
-        return self._memo.get("walk", index, lambda: self._start_walk(index))
-
-    def _start_walk(self, index: int) -> tuple[list[Planes], int]:
-        luma = self._source.luma(index)[np.newaxis]
-        noise = self._exposure.exposure(index).noise
-        return walk([self._look(index, luma)], WALK, noise)
-
-    def _twin(self, index: int) -> Plane:
-        pictures, pad = self._walk(index)
-        return np.asarray(cropped(pictures[TWIN], pad)[0])
-
     def _twins(self, index: int) -> Twins:
         return self._memo.get("twins", index, lambda: self._find_twins(index))
 
@@ -165,12 +138,12 @@ class Chain:
         for other, way in ((index - 1, motion.backward), (index + 1, motion.forward)):
             back = self.motion.flow(other, index)
             if way is not None and back is not None:
-                neighbours.append((self._twin(other), way, back))
+                neighbours.append((self._walks.twin(other), way, back))
         exposure = self._exposure.exposure(index).value
         return twins(neighbours, motion.velocity, exposure)
 
     def _scores(self, index: int) -> list[float]:
-        pictures, pad = self._walk(index)
+        pictures, pad = self._walks.pictures(index)
         against = self._twins(index)
         return [score(cropped(picture, pad)[0], against) for picture in pictures]
 
@@ -257,8 +230,8 @@ class Chain:
         twins tell.
         """
         noise = self._exposure.exposure(index).noise
-        looks = [self._look(index, self._source.planes(index))]
-        pictures, pad = self._walk(index)
+        looks = [self._walks.look(index)]
+        pictures, pad = self._walks.pictures(index)
         if len(looks[0]["planes"]) > 1:
             way = (strength,) if strength <= WALK[TWIN] else (WALK[TWIN], strength)
             pictures, pad = walk(looks, way, noise, pad=pad)

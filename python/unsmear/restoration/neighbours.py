@@ -21,12 +21,11 @@ from unsmear.restoration.registration import settled
 from unsmear.restoration.sampling import composed, inside
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from unsmear.restoration.clip_exposure import ClipExposure
     from unsmear.restoration.source import Source
+    from unsmear.restoration.walks import Walks
 
     Plane = NDArray[np.float32]
     Field = NDArray[np.float32]
@@ -48,8 +47,8 @@ class Neighbours:
         What blurred its frames.
     exposure : ClipExposure
         Theirs.
-    twin : callable
-        Returns a frame's luma (H, W), restored by itself, by its index.
+    walks : Walks
+        Its frames, restored by themselves.
     method : str
         Of `unsmear.optical_flow`.
     options : dict
@@ -61,7 +60,7 @@ class Neighbours:
         source: Source,
         motion: ClipMotion,
         exposure: ClipExposure,
-        twin: Callable[[int], Plane],
+        walks: Walks,
         *,
         method: str,
         options: dict[str, Any],
@@ -69,10 +68,10 @@ class Neighbours:
         self._source = source
         self._motion = motion
         self._exposure = exposure
-        self._twin = twin
+        self._walks = walks
         self._memo = Memo()
         self._between = ClipMotion(
-            twin,
+            walks.twin,
             source.count,
             colour=False,
             method=method,
@@ -101,9 +100,9 @@ class Neighbours:
             self._source.planes(other),
             motion,
             exposure,
-            settled(self._twin(other), self._twin(index), way, seen),
+            settled(self._walks.twin(other), self._walks.twin(index), way, seen),
             seen,
-            self._source.ceiling,
+            self._walks.ceiling(other),
         )
 
     def forget_before(self, index: int) -> None:

@@ -62,7 +62,8 @@ class Source:
     scale : float
         Grey levels per unit of the frames.
     ceiling : float or None
-        Grey level from which a sample is clipped; None for floats, which are not.
+        Grey level from which a sample may be clipped light (`clipping`); None for
+        floats, which are not.
     """
 
     def __init__(self, frames: ArrayLike, channel_axis: int | None) -> None:
