@@ -38,11 +38,12 @@ class SequenceResult:
     frames : ndarray of shape (N, H, W) or like the frames given
         The frames asked for, restored; like the input in type and range.
     flows : ndarray of shape (N, H, W, 2), float32
-        Velocity at mid-exposure of each, px/frame; NaN = unknown.
+        Velocity at mid-exposure of each, px/frame; NaN = unknown, and in black bars.
     reports : list of dict
         One per frame, plain data: exposure and the trust in it, noise, strength of
         the prior, the verdict in words (``verdict``, ``expected_gain_db``,
-        ``ringing_risk``), per moving region too, and all parameters.
+        ``ringing_risk``), per moving region too, widths of black ``bars`` (px), and
+        all parameters.
     """
 
     frames: NDArray[Any]
@@ -128,7 +129,9 @@ def deblur_sequence(
 
     Needs motion between 1 px and a tenth of the picture per frame. Blur that is not
     motion (focus), rolling shutters and strong compression are not modelled: the
-    verdict then leaves frames as they are, or should.
+    verdict then leaves frames as they are, or should. Black bars are no picture: they
+    come back as they were. White samples of integer frames may have been brighter than
+    they could say; where a restoration shows that they were not, they are white.
 
     References
     ----------

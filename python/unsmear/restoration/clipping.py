@@ -11,8 +11,10 @@ others too,
 
 .. math:: \operatorname{mean}_{p \in C} \max((A x)(p) - \text{ceiling}, 0)
 
-is 0 to 2 grey levels for white clipped before the blur, recorded or synthetic, and 11
-to 45 for lights of 1.2 to 2 times white (photographs, noise 1, blur of 2.5 to 9 px).
+is 0 to 2 grey levels for recorded means and for photographs with white lights, and 11
+to 45 with lights of 1.2 to 2 times white (noise 1, blur of 2.5 to 9 px). A mean of
+clipped frames with many small lights of twice white reaches 11 too: when in doubt light
+may be brighter.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["brighter_than_white"]
 
-EXCESS = 5.0
+EXCESS = 7.0
 """Grey levels, between the two."""
 LEAST_BLUR = 2.0
 """Blur, px, that tells: less is explained by both."""

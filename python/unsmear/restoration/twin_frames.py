@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Twins", "choose_strength", "errors", "of_noise", "score", "twins"]
 
 GREATEST_ERROR = 30.0
-LEAST_BLUR = 0.7
+LEAST_BLUR = 0.45
 MARGIN = 4
 TOLERANCE = 1.02
 LEAST_STRENGTH = 0.5 * 0.065
