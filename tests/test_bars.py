@@ -47,6 +47,12 @@ def test_a_picture_without_bars_has_none(planes: np.ndarray) -> None:
     np.testing.assert_array_equal(planes, before)
 
 
+def test_the_ground_around_a_bright_thing_is_no_bar() -> None:
+    planes = np.zeros((1, *SIZE), np.float32)
+    planes[:, 25:40, 30:50] = 200
+    assert bars(planes) == Bars()
+
+
 def test_a_bright_sky_is_no_bar() -> None:
     planes = noisy(90.0)
     planes[:, :20] = 255

@@ -8,7 +8,10 @@ them for recorded light rings there. Samples in bars are therefore unknown (NaN)
 A bar is a run of whole rows (or columns between the rows found) from an edge of the
 frame, each darker than `DARKEST` and even within `EVENNESS`, in grey levels of 0..255:
 noise of one level alone makes a row of a few hundred samples more uneven than that. The
-`SOFT_EDGE` lines next to it, mixed with it by resampling or coding, count as bar too.
+lines next to it, mixed with it by resampling or coding, count as bar too: at least
+`SOFT_EDGE`, and up to `WIDEST_EDGE`, half a block of a codec, until most of a line is
+something else than black. Around a bright thing before a black ground there are no
+bars: that it is black there is worth knowing.
 """
 
 from __future__ import annotations
@@ -24,7 +27,10 @@ __all__ = ["Bars", "bars"]
 
 DARKEST = 24.0
 EVENNESS = 4.0
-SOFT_EDGE = 2
+SOFT_EDGE, WIDEST_EDGE = 2, 9
+LEAST_STEP = 8.0
+LEAST_SHARE = 0.5
+"""Samples of the first line of the picture that differ from the bar by a step."""
 LEAST_PICTURE = 32
 """Rows and columns that must be left; else the frame is dark, not framed."""
 
@@ -61,10 +67,16 @@ def bars(planes: NDArray[np.float32]) -> Bars:
 
 def _lines(planes: NDArray[np.float32]) -> int:
     """Return how many first lines of channels (C, lines, samples) are bar."""
+    lines = np.moveaxis(planes, 1, 0)
     count = 0
-    for line in np.moveaxis(planes, 1, 0):
+    for line in lines:
         # Unknown samples compare to nothing: a line that has any is no bar.
         if not (line.max() <= DARKEST and (np.ptp(line, axis=1) <= EVENNESS).all()):
             break
         count += 1
-    return min(count + SOFT_EDGE, planes.shape[1]) if count else 0
+    if count > 0:
+        for first in range(count + SOFT_EDGE, min(count + WIDEST_EDGE, len(lines))):
+            step = np.abs(lines[first] - lines[0]).max(axis=0)
+            if (step > LEAST_STEP).mean() >= LEAST_SHARE:
+                return first
+    return 0
