@@ -101,6 +101,11 @@ def test_what_is_not_shown_may_still_guide(
     for first in (1, 2):
         chains.used_from = first
         assert made.best(0, None)[2] == expected
+    # But no better than the blurred frame is not enough then.
+    chains.ratios = (1.05, 1.02, 1.0)
+    assert made.best(0, None)[2] == 1
+    chains.used_from = 0
+    assert made.best(0, None)[2] == 3
 
 
 def test_each_pass_keeps_results_that_those_after_it_look_back_on(

@@ -29,6 +29,8 @@ __all__ = ["Passes", "reach"]
 MOST_PASSES = 3
 UNSTEADY = 0.25
 """Acceleration relative to velocity from which a further pass is worth its time."""
+PROVEN = 0.99
+"""Ratio below which a pass is shown after passes that were not."""
 PROMISING = 1.3
 """Ratio of the verdict below which flow is measured on the restored frame, whether that
 is good enough to be shown or not."""
@@ -79,8 +81,10 @@ class Passes:
             before, last = last, following.restored(index)
             if not last.ratio < before.ratio:
                 break
-            # One that is not good enough to be shown may still guide one that is.
-            if last.changed.any():
+            # One that is not good enough to be shown may still guide one that is. That
+            # has more to prove: motion was hard to find there.
+            good = result.changed.any() or last.ratio < PROVEN
+            if last.changed.any() and good:
                 result, chain, passes = last, following, number
         return result, chain, passes
 
