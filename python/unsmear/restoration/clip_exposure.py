@@ -8,6 +8,11 @@ how sharp they are,
 so that a shutter that stays as it is gives an exposure that stays as it is. Where less
 than half of them can be relied on, the frame's own cautious value is used; where it is
 cautious because blur is short, the mean over frames like it, by how near they are.
+
+Codecs leave out what is weaker than their steps. Of H.264 at usual settings (crf 17 to
+28) the search then made nothing. It says "unsure" with hardly any blur for likeliest,
+and is asked again as if noise hid what is missing: the zeros of the blur among the
+stronger, slower waves tell the exposure within 5 %.
 """
 
 from __future__ import annotations
@@ -31,6 +36,10 @@ __all__ = ["ClipExposure", "Exposure"]
 LIMITS = (0.06, 2.0)
 LONGEST = 1.25
 """No shutter is open for more than 1; flow too short by a fifth is nothing unusual."""
+CODED_NOISE = (3.0, 5.0)
+"""Noise, grey levels, below which a codec may have taken away what was recorded."""
+CODED_LIKELIEST = 0.2
+CODED_GREATEST_NOISE = 1.5
 POOLED = 1
 SMOOTHED = 2
 LEAST_SPREAD = 0.02
@@ -86,6 +95,16 @@ class ClipExposure:
         return self._memo.get("found", index, lambda: self._search(index))
 
     def _search(self, index: int) -> dict[str, Any]:
+        found = self._likeliest(index, self._noise)
+        if self._noise is None and self._given is None and _looks_coded(found):
+            for noise in CODED_NOISE:
+                again = self._likeliest(index, noise)
+                if again["status"] == "ok":
+                    # What is left of noise is what the restoration has to bear.
+                    return again | {"noise": found["noise"]}
+        return found
+
+    def _likeliest(self, index: int, noise: float | None) -> dict[str, Any]:
         frames = self._around(index, POOLED)
         motions = [self._motion.motion(j) for j in frames]
         return dict(
@@ -94,7 +113,7 @@ class ClipExposure:
                 _stack([motion.velocity for motion in motions]),
                 _stack([motion.acceleration for motion in motions]),
                 LIMITS,
-                self._noise,
+                noise,
                 self._seed + index,
                 of_content=True,
             )
@@ -128,6 +147,19 @@ class ClipExposure:
     def _mean(self, frames: list[int], weights: list[float]) -> float:
         logs = [np.log(self._found(j)["value"]) for j in frames]
         return float(np.exp(np.average(logs, weights=weights)))
+
+
+def _looks_coded(found: dict[str, Any]) -> bool:
+    """Return whether fine detail is missing as codecs leave it out.
+
+    They drop what is weaker than their steps, noise first: the spectrum ends early, as
+    no scene's does, and the search takes hardly any blur for likeliest.
+    """
+    return bool(
+        found["status"] == "unsure"
+        and found["likeliest"] < CODED_LIKELIEST
+        and found["noise"] < CODED_GREATEST_NOISE
+    )
 
 
 def _nearness(other: int, index: int) -> float:
