@@ -1,6 +1,6 @@
 """Blurred clips restored without any parameter: gains over the blurred frames.
 
-    python benches/deblur_video.py [--data DIR] [--joint 3] [--pictures camera]
+    python benches/deblur_video.py [--data DIR] [--joint 1] [--pictures camera]
 
 Synthetic clips: photographs of scikit-image under every kind of motion, exposures 1 and
 0.5, noise of one grey level, 8 bits, 5 frames; the middle frame counts, without a
@@ -170,7 +170,7 @@ def main() -> None:
     """Measure and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, help="folder of recorded clips")
-    parser.add_argument("--joint", type=int, choices=(1, 3), default=1)
+    parser.add_argument("--joint", type=int, choices=(1, 3), default=3)
     parser.add_argument("--pictures", nargs="*", default=["camera", "astronaut"])
     parser.add_argument("--motions", nargs="+", default=MOTIONS, choices=MOTIONS)
     parser.add_argument("--exposures", nargs="+", type=float, default=EXPOSURES)

@@ -60,7 +60,7 @@ def deblur_sequence(
     exposure: float | str = "auto",
     indices: Sequence[int] | None = None,
     flow_method: str = "balanced",
-    joint: int = 1,
+    joint: int = 3,
     second_pass: bool | None = None,
     noise: float | None = None,
     seed: int = 0,
@@ -87,12 +87,12 @@ def deblur_sequence(
         Default: all.
     flow_method : {"balanced", "fast", "accurate"}
         See `unsmear.optical_flow`, which takes ``flow_parameters``.
-    joint : {1, 3}, default 1
+    joint : {3, 1}, default 3
         Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
-        come out .5 to 3 dB better, frames blurred in different directions more (4.7 dB
+        come out 1 to 4 dB better, frames blurred in different directions more (4.7 dB
         where their blur is known), and with less flicker than as they came; in half as
-        much time again for a whole clip. Frames blurred by less than about 3 px are
-        restored by themselves.
+        much time again for a whole clip. Frames whose exposure is not sure, or that are
+        blurred by less than about 3 px, are restored by themselves, as are all by 1.
     second_pass : bool, optional
         Measure flow again on restored frames, up to three passes in all, as long as
         restored frames agree better. Default: for frames whose acceleration exceeds a

@@ -14,6 +14,7 @@ mod errors;
 mod exposure;
 mod flow;
 mod interpolate;
+mod looks;
 mod metrics;
 mod motion_deblur;
 mod motion_operator;
@@ -43,6 +44,8 @@ mod _unsmear {
     #[pymodule_export]
     use crate::interpolate::sample;
     #[pymodule_export]
+    use crate::looks::{looks_reach, record_look, restore_looks};
+    #[pymodule_export]
     use crate::metrics::{error_map, estimate_noise, psnr, ssim};
     #[pymodule_export]
     use crate::motion_deblur::{motion_deblur_f32, motion_deblur_f64};
@@ -51,9 +54,7 @@ mod _unsmear {
     #[pymodule_export]
     use crate::psf::{fspecial_motion, motion_psf};
     #[pymodule_export]
-    use crate::restoration::{
-        dilated, frame_motion, looks_reach, record_look, regions, restore_looks, visibility,
-    };
+    use crate::restoration::{dilated, frame_motion, regions, visibility};
     #[pymodule_export]
     use crate::thesis::{thesis_bank, thesis_flow, thesis_gated_mean, thesis_stages};
     #[pymodule_export]

@@ -63,7 +63,7 @@ def deblur_sequence(
     *,
     exposure: float | str = "auto",
     flow_method: str = "balanced",
-    joint: int = 1,
+    joint: int = 3,
     second_pass: bool | None = None,
     noise: float | None = None,
     seed: int = 0,
@@ -99,7 +99,7 @@ def deblur_sequence(
     Notes
     -----
     A task holds its chunk and 7 frames on each side, 21 unless ``second_pass`` is
-    False, one more with ``joint=3``. Their motion and exposure are found again in
+    False, one more unless ``joint`` is 1. Their motion and exposure are found again in
     every chunk that needs them, which for one pass costs as much as 7 frames more: a
     quarter for chunks of 30 frames, 7 % for chunks of 100.
 

@@ -53,6 +53,9 @@ SHARPER = 1.0
 """Score of the sharper prior, relative to the other's, below which it is used."""
 KEPT_BEHIND = 5
 """Frames that one looks back on, through exposures and twins of its neighbours."""
+JOINED = {"given": np.inf, "ok": np.inf, "unsure": 0.9, "small": 0.0, "beyond": 0.0}
+"""Ratio of the verdict below which frames are restored together, by the trust in their
+exposure."""
 REACH = 7
 """Frames on each side that one restored in a pass depends on: those of the motions
 behind its neighbours' exposures (five), for its twins and for its neighbours' strength
@@ -209,14 +212,15 @@ class Chain:
     def joined(self, index: int) -> Restored:
         """Return a restored frame with what its neighbours saw of it.
 
-        A frame that is hardly blurred misses little, less than neighbours blurred alike
-        carry over with the errors of the flow.
+        Only where the exposure is sure, or frames agree well: a wrong one is wrong for
+        every frame. A frame that is hardly blurred misses little, less than neighbours
+        blurred alike carry over with the errors of the flow.
         """
         before = self.restored(index)
         alone = before.alone
         if self._settings.joint == 1 or alone is None or not before.changed.any():
             return before
-        if before.report["exposure_status"] == "small":
+        if not before.ratio < JOINED[before.report["exposure_status"]]:
             return before
         picture, more = self._several.restored(index)
         planes = self._source.planes(index)

@@ -25,6 +25,10 @@ FIRST = (4, 12)
 SHARP_STRENGTH = 1.4
 """Strength of the sharper prior, relative to that of total variation."""
 
+SPLINE, LINES = "spline", "cubic"
+"""Taps of the operators: along paths of up to 8 px an interpolating spline, in
+up to twice the time; or line by line, which damps the finest detail."""
+
 NEXT = (3, 12)
 """Turns and steps of one that starts from another of nearly the same strength."""
 
@@ -39,6 +43,7 @@ class Look(TypedDict):
     offset: NDArray[np.float32] | None
     exposure: float
     ceiling: float | None
+    taps: str
 
 
 def look(
@@ -49,6 +54,7 @@ def look(
     weights: NDArray[np.float32],
     offset: NDArray[np.float32] | None = None,
     ceiling: float | None = None,
+    taps: str = SPLINE,
 ) -> Look:
     """Return one look; unknown motion and offset are not believed."""
     known = np.isfinite(velocity).all(axis=-1)
@@ -63,6 +69,7 @@ def look(
         "offset": offset,
         "exposure": float(exposure),
         "ceiling": ceiling,
+        "taps": taps,
     }
 
 

@@ -12,7 +12,16 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.restoration.clipping import brighter_than_white
-from unsmear.restoration.looks import TWIN, WALK, Look, cropped, look, walk
+from unsmear.restoration.looks import (
+    LINES,
+    SPLINE,
+    TWIN,
+    WALK,
+    Look,
+    cropped,
+    look,
+    walk,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,15 +80,17 @@ class Walks:
 
     def _look(self, index: int, planes: Planes, ceiling: float | None) -> Look:
         motion = self._motion.motion(index)
-        exposure = self._exposure.exposure(index).value
-        visible = _unsmear.visibility(motion.velocity, exposure)
+        exposure = self._exposure.exposure(index)
+        visible = _unsmear.visibility(motion.velocity, exposure.value)
         return look(
             planes,
             motion.velocity,
             motion.acceleration,
-            exposure,
+            exposure.value,
             visible,
             ceiling=ceiling,
+            # The exposures that are assumed of short blur were found with lines.
+            taps=LINES if exposure.status == "small" else SPLINE,
         )
 
     def _walk(self, index: int) -> tuple[list[Planes], int, float | None]:

@@ -52,7 +52,7 @@ def deblur_clip(
     exposure: float | str = AUTOMATIC,
     flow: ArrayLike | None = None,
     flow_method: str = "balanced",
-    joint: int = 1,
+    joint: int = 3,
     second_pass: bool | None = None,
     noise: float | None = None,
     seed: int = 0,

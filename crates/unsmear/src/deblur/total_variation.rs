@@ -83,13 +83,13 @@ pub struct Effort {
     pub half: (usize, usize),
     /// Turns, >= 1, and steps per turn at full size; a single turn adapts neither prior nor weights.
     pub full: (usize, usize),
-    /// Taps of the operator at full size: [`Taps::Spline`] costs more where blur is short, and gains more.
+    /// Taps of the operator at full size: splines cost more where blur is short, and gain more.
     pub taps: Taps,
 }
 
 impl Effort {
     /// Within 0.1 dB of convergence at noise of a grey level, 0.6 dB at none.
-    pub const QUALITY: Self = Self { half: (5, 12), full: (4, 15), taps: Taps::Spline };
+    pub const QUALITY: Self = Self { half: (5, 12), full: (4, 15), taps: Taps::ThriftySpline };
     /// About 1 dB below, 2 to 4 where blur is short, in half the time or less.
     pub const FAST: Self = Self { half: (5, 12), full: (2, 10), taps: Taps::Cubic };
 

@@ -28,6 +28,9 @@ pub enum Taps {
     /// As [`Taps::Cubic`], but an interpolating cubic spline sampled along the path itself where that is short; see
     /// `short_paths.rs`. Where the padding is too narrow for it, as the cubic.
     Spline,
+    /// As [`Taps::Spline`] where neighbours move alike; where each pixel needs a stencil of its own, which costs most,
+    /// only for the shortest paths.
+    ThriftySpline,
     /// The triangle: faster and less accurate, no weight negative, as Richardson-Lucy needs it.
     Linear,
 }
@@ -36,7 +39,7 @@ impl Taps {
     /// Where the kernel ends, px.
     pub(super) fn reach(self) -> usize {
         match self {
-            Self::Cubic | Self::Spline => 2,
+            Self::Cubic | Self::Spline | Self::ThriftySpline => 2,
             Self::Linear => 1,
         }
     }

@@ -93,7 +93,9 @@ impl MotionOperator {
             }
         }
         let short = match taps {
-            Taps::Spline if paths.reach() <= pad => ShortPaths::of(paths),
+            Taps::Spline | Taps::ThriftySpline if paths.reach() <= pad => {
+                ShortPaths::of(paths, taps == Taps::ThriftySpline)
+            }
             _ => None,
         };
         let others = short.as_ref().map(|short| short.others(paths));

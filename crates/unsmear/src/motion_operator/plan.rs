@@ -119,8 +119,10 @@ impl RowPlan {
         record.planes = (self.lanes.len() - record.lanes as usize) as u8;
         let (before, lanes) = (self.lines.len(), record.lanes_of(&self.lanes));
         let sums = match taps {
-            Taps::Cubic | Taps::Spline => survey::<true>(&record, lanes, &mut self.lines),
             Taps::Linear => survey::<false>(&record, lanes, &mut self.lines),
+            Taps::Cubic | Taps::Spline | Taps::ThriftySpline => {
+                survey::<true>(&record, lanes, &mut self.lines)
+            }
         };
         for (gain, sum) in self.lanes[record.lanes as usize].0.iter_mut().zip(sums.0) {
             *gain = if *gain > 0.0 { 1.0 / sum } else { 0.0 };

@@ -11,7 +11,8 @@
 //!
 //! Units: px. Validity: paths of up to [`LONGEST`]; a padding that holds all that is read. A stencil costs two to three
 //! times what lines cost where neighbours move alike, and some eight times where each has a stencil of its own. So paths
-//! are short only where at least [`LEAST_SHARE`] of all that move are, and up to [`LONGEST_OF_ITS_OWN`] where they differ.
+//! are short only where at least [`LEAST_SHARE`] of all that move are, and the thrifty call short only those up to
+//! [`LONGEST_OF_ITS_OWN`] where they differ.
 
 use super::bands::{Bands, each};
 use super::lanes::{LANES, Lanes};
@@ -24,7 +25,7 @@ use crate::tasks::{cut, runs};
 /// Longest path, px, that counts as short: at 7 px the gain is 1.6 dB without noise, 0.4 dB at noise of a grey level.
 const LONGEST: f32 = 8.0;
 
-/// The same where pixels move otherwise than their neighbours, so that each needs a stencil of its own.
+/// The same to the thrifty where pixels move otherwise than their neighbours, so that each needs a stencil of its own.
 const LONGEST_OF_ITS_OWN: f32 = 4.0;
 
 /// Least share of the moving pixels.
@@ -57,7 +58,7 @@ pub(super) struct ShortPaths {
 
 impl ShortPaths {
     /// The short ones of `paths`; None when they are few, or the columns too few.
-    pub(super) fn of(paths: &MotionPaths) -> Option<Self> {
+    pub(super) fn of(paths: &MotionPaths, thrifty: bool) -> Option<Self> {
         let (height, width) = paths.dim();
         if width < LANES {
             return None;
@@ -67,7 +68,8 @@ impl ShortPaths {
         let mut planes: Vec<Vec<f32>> = both(&paths.velocity).into();
         planes.extend(both(&paths.curvature));
         planes.extend(paths.offset.iter().flat_map(both));
-        let limit = if neighbours_agree(&planes, width) { LONGEST } else { LONGEST_OF_ITS_OWN };
+        let costly = thrifty && !neighbours_agree(&planes, width);
+        let limit = if costly { LONGEST_OF_ITS_OWN } else { LONGEST };
         let mut own = vec![0.0; height * width];
         let (mut longest, mut farthest, mut count, mut moving) = (0.0f32, 0.0f32, 0, 0);
         for (i, own) in own.iter_mut().enumerate() {

@@ -157,8 +157,10 @@ fn renew<const N: usize>(
     rows: &mut Expanded<N>,
 ) {
     match taps {
-        Taps::Cubic | Taps::Spline => rows.renew::<true>(plan, group, records),
         Taps::Linear => rows.renew::<false>(plan, group, records),
+        Taps::Cubic | Taps::Spline | Taps::ThriftySpline => {
+            rows.renew::<true>(plan, group, records);
+        }
     }
 }
 

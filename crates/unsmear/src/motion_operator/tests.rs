@@ -121,7 +121,7 @@ fn kernel(taps: Taps, z: f64) -> f64 {
         Taps::Linear => (1.0 - y).max(0.0),
         Taps::Cubic if y < 1.0 => (1.5 * y - 2.5) * y * y + 1.0,
         Taps::Cubic if y < 2.0 => ((-0.5 * y + 2.5) * y - 4.0) * y + 2.0,
-        Taps::Cubic | Taps::Spline => 0.0,
+        Taps::Cubic | Taps::Spline | Taps::ThriftySpline => 0.0,
     }
 }
 

@@ -18,8 +18,8 @@ const CAUTIOUS: Prior = Prior { rounding: 0.5, power: Power::One };
 /// The prior for motion that is right.
 const SHARP: Prior = Prior { rounding: 1.0, power: Power::Half };
 
-/// Where the first restoration starts.
-const START: Effort = Effort { half: (5, 12), full: (1, 12), taps: Taps::Cubic };
+/// Where the first restoration starts: turns and steps at half size and at full size.
+const START: [(usize, usize); 2] = [(5, 12), (1, 12)];
 
 /// A picture restored with growing strength of the prior: strengths and effort.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,8 @@ pub struct Walk {
     pub robust: f64,
     /// Whether the prior is the sharper one.
     pub sharp: bool,
+    /// Taps of the operators at full size.
+    pub taps: Taps,
     /// Turns and steps of the first restoration.
     pub first: (usize, usize),
     /// Turns and steps of the others.
@@ -61,7 +63,7 @@ impl Walk {
         });
         let operators = looks
             .iter()
-            .map(|look| MotionOperator::new(&look.paths, Taps::Cubic, pad))
+            .map(|look| MotionOperator::new(&look.paths, self.taps, pad))
             .collect::<Result<Vec<_>>>()?;
         let data = looks
             .iter()
@@ -86,12 +88,13 @@ impl Walk {
     /// The picture from half size, on the grid padded by `pad`.
     fn start(&self, looks: &[Look<'_>], pad: usize, control: &Control) -> Result<Vec<Vec<f32>>> {
         let (noise, lambda) = (self.noise, self.lambdas.first().copied());
-        let rough = TotalVariation { noise, lambda, effort: START }.restore(looks, control)?;
+        let effort = Effort { half: START[0], full: START[1], taps: self.taps };
+        let rough = TotalVariation { noise, lambda, effort }.restore(looks, control)?;
         if rough.pad > pad {
             return Err(Error::value("pad", format!("at least {}", rough.pad), pad));
         }
         let Some(first) = looks.first() else { return Ok(Vec::new()) };
-        let operator = MotionOperator::new(&first.paths, Taps::Cubic, pad)?;
+        let operator = MotionOperator::new(&first.paths, self.taps, pad)?;
         let (rows, columns) = operator.unknown_shape();
         let more = pad - rough.pad;
         let (height, width) = (rows - 2 * more, columns - 2 * more);
@@ -134,6 +137,7 @@ mod tests {
             noise: 1.0,
             robust: 3.0,
             sharp: false,
+            taps: Taps::Cubic,
             first: (3, 8),
             next: (3, 8),
         };

@@ -90,3 +90,23 @@ fn short_paths_agree_with_samples_of_the_spline_image() {
         assert!((f64::from(value) - wanted).abs() < 0.02, "{i} {value} {wanted}");
     }
 }
+
+#[test]
+fn the_thrifty_leave_longer_paths_that_differ_to_lines() {
+    let shape = (12, 20);
+    let blur = |taps, varies: f32| {
+        let motion = field(shape, |x, _| [6.0 + varies * x, 1.0]);
+        let paths = MotionPaths::new(&motion, 1.0, None).unwrap();
+        let operator = MotionOperator::new(&paths, taps, paths.reach() + 2).unwrap();
+        let (rows, columns) = operator.unknown_shape();
+        let mut b = vec![0.0; shape.0 * shape.1];
+        operator.apply(&noise(rows * columns, 7), &mut b);
+        b
+    };
+    let [spline, thrifty, lines] =
+        [Taps::Spline, Taps::ThriftySpline, Taps::Cubic].map(|taps| blur(taps, 0.01));
+    assert_eq!(thrifty, lines);
+    assert_ne!(spline, lines);
+    // Neighbours that move alike share a stencil.
+    assert_eq!(blur(Taps::ThriftySpline, 0.0), blur(Taps::Spline, 0.0));
+}
