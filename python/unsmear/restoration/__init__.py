@@ -6,6 +6,7 @@
 | bars           | black rows and columns that are no picture                      |
 | sampling       | pictures and fields between pixels                              |
 | looks          | what the solver takes                                           |
+| stillness      | what stands still although flow says that it moves              |
 | clip_motion    | velocity and acceleration of every frame                        |
 | clip_exposure  | exposure of every frame, smoothed in time                       |
 | clipping       | whether what is clipped was brighter than white                 |

@@ -23,8 +23,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from unsmear import _unsmear
+from unsmear._arrays import luma
 from unsmear.flow import optical_flow
 from unsmear.restoration.sampling import composed, inside, pulled_field, smoothed
+from unsmear.restoration.stillness import still
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,7 +138,17 @@ class ClipMotion:
             change, bend = _third_order(one, back, after, before)
             velocity = velocity + _carried_on(change, velocity)
             acceleration = acceleration + _carried_on(bend, velocity)
+        ways = ((index + 1, velocity), (index - 1, -velocity))
+        others = [(self._luma(j), way) for j, way in ways if 0 <= j < self._count]
+        rest = still(self._luma(index), others)[..., np.newaxis]
+        velocity, acceleration = (
+            np.where(rest, np.float32(0), field) for field in (velocity, acceleration)
+        )
         return Motion(velocity, acceleration, forward, backward)
+
+    def _luma(self, index: int) -> NDArray[np.float32]:
+        frame = np.asarray(self._guide(index), np.float64)
+        return (luma(frame) if self._axis is not None else frame).astype(np.float32)
 
     def _believed(self, index: int, other: int, way: Field | None) -> Field | None:
         """Return a flow, NaN where the way there and back does not end at its start.
