@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from unsmear.restoration.chain import Chain
-from unsmear.restoration.clip_exposure import LIMITS, LONGEST
+from unsmear.restoration.clip_exposure import LIMITS
 
 if TYPE_CHECKING:
     from unsmear.restoration.records import Restored, Settings
@@ -19,6 +19,8 @@ ALTERNATIVES = (0.7, 1.4)
 """Exposures tried where the search was not sure, relative to the one assumed."""
 AS_GOOD = 1.05
 """Twins tell exposures apart whose ratios differ by more than this factor."""
+LONGEST = 1.0
+"""No shutter is open for more: longer ones cost a small mover 1 to 4 dB."""
 LEAST_BLUR = 4.0
 """Blur (95 % quantile, px) from which twins tell exposures apart at all."""
 MOST_CHAINS = 4
@@ -29,10 +31,8 @@ class Alternatives:
 
     Twin frames err alike under a wrong exposure and hardly notice a small error of it;
     half as much again they do. Of those as good to them as the best the one next to
-    what the search found likeliest is taken. An exposure longer than a shutter makes it
-    is not tried: it cost a small thing before a still scene 4 dB. Of blur without gaps
-    in its spectrum twins know nothing: they would take the longest for the best, and
-    lose 1 to 8 dB.
+    what the search found likeliest is taken. Of blur without gaps in its spectrum twins
+    know nothing: they would take the longest for the best, and lose 1 to 8 dB.
     """
 
     def __init__(
@@ -55,8 +55,8 @@ class Alternatives:
         found = likeliest is not None and LIMITS[0] < likeliest < LIMITS[1]
         tried = [(value, result, chain)]
         for factor in ALTERNATIVES:
-            exposure = round(factor * value, 2)
-            if exposure > LONGEST:
+            exposure = min(round(factor * value, 2), LONGEST)
+            if exposure == value:
                 continue
             other = self._chain(exposure)
             restored = other.restored(index)

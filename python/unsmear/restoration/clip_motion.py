@@ -138,8 +138,8 @@ class ClipMotion:
             change, bend = _third_order(one, back, after, before)
             velocity = velocity + _carried_on(change, velocity)
             acceleration = acceleration + _carried_on(bend, velocity)
-        ways = ((index + 1, velocity), (index - 1, -velocity))
-        others = [(self._luma(j), way) for j, way in ways if 0 <= j < self._count]
+        ways = ((index + 1, forward), (index - 1, backward))
+        others = [(self._luma(j), way) for j, way in ways if way is not None]
         rest = still(self._luma(index), others)[..., np.newaxis]
         velocity, acceleration = (
             np.where(rest, np.float32(0), field) for field in (velocity, acceleration)

@@ -1,7 +1,9 @@
 """Every frame's luma restored with growing strength of the prior.
 
 From these a strength is chosen, the neighbours take their twins and the channels their
-start; and they tell what clipped samples mean (`clipping`).
+start; and they tell what clipped samples mean (`clipping`). They go line by line, which
+is enough to compare and takes half the time of splines: what is shown is made from them
+by the finer operator.
 """
 
 from __future__ import annotations
@@ -76,21 +78,25 @@ class Walks:
 
     def look(self, index: int) -> Look:
         """Return the solver's look at all channels of a frame."""
-        return self._look(index, self._source.planes(index), self.ceiling(index))
+        # The exposures that are assumed of short blur were found with lines.
+        small = self._exposure.exposure(index).status == "small"
+        taps = LINES if small else SPLINE
+        return self._look(index, self._source.planes(index), self.ceiling(index), taps)
 
-    def _look(self, index: int, planes: Planes, ceiling: float | None) -> Look:
+    def _look(
+        self, index: int, planes: Planes, ceiling: float | None, taps: str
+    ) -> Look:
         motion = self._motion.motion(index)
-        exposure = self._exposure.exposure(index)
-        visible = _unsmear.visibility(motion.velocity, exposure.value)
+        exposure = self._exposure.exposure(index).value
+        visible = _unsmear.visibility(motion.velocity, exposure)
         return look(
             planes,
             motion.velocity,
             motion.acceleration,
-            exposure.value,
+            exposure,
             visible,
             ceiling=ceiling,
-            # The exposures that are assumed of short blur were found with lines.
-            taps=LINES if exposure.status == "small" else SPLINE,
+            taps=taps,
         )
 
     def _walk(self, index: int) -> tuple[list[Planes], int, float | None]:
@@ -100,7 +106,7 @@ class Walks:
         luma = self._source.luma(index)[np.newaxis]
         noise = self._exposure.exposure(index).noise
         ceiling = self._source.ceiling
-        own = self._look(index, luma, ceiling)
+        own = self._look(index, luma, ceiling, LINES)
         pictures, pad = walk([own], WALK, noise)
         if ceiling is not None and not brighter_than_white(own, pictures[TWIN], pad):
             ceiling = own["ceiling"] = None
