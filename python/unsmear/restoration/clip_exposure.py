@@ -6,7 +6,8 @@ how sharp they are,
     log s = sum w_j log s_j / sum w_j,   w_j = (1 - |j - i| / 3) / (spread_j^2 + .02^2),
 
 so that a shutter that stays as it is gives an exposure that stays as it is. Where less
-than half of them can be relied on, the frame's own cautious value is used; where it is
+than half of them can be relied on, or those scatter by more than a shutter that stays
+as it is, none can, and the frame's own cautious value is used; where it is
 cautious because blur is short, the mean over frames like it, by how near they are.
 
 Codecs leave out what is weaker than their steps. Of H.264 at usual settings (crf 17 to
@@ -43,6 +44,9 @@ CODED_GREATEST_NOISE = 1.5
 POOLED = 1
 SMOOTHED = 2
 LEAST_SPREAD = 0.02
+GREATEST_SCATTER = 0.25
+"""Of log s over the frames around one. Those of shaken clips scatter by .1, those found
+in lines of print, which have gaps of their own in their spectra, by .4 and more."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,12 @@ class ClipExposure:
             return Exposure(self._given, "given", own["noise"], own)
         near = self._around(index, SMOOTHED)
         trusted = [j for j in near if self._found(j)["status"] == "ok"]
-        if 2 * len(trusted) < len(near):
+        weights = [
+            _nearness(j, index) / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
+            for j in trusted
+        ]
+        many = 2 * len(trusted) >= len(near)
+        if not (many and self._scatter(trusted, weights) <= GREATEST_SCATTER):
             value, status = own["value"], own["status"]
             if status == "ok":
                 value, status = min(value, 1.0), "unsure"
@@ -136,13 +145,15 @@ class ClipExposure:
                 alike = [j for j in near if self._found(j)["status"] == "small"]
                 value = self._mean(alike, [_nearness(j, index) for j in alike])
             return Exposure(float(value), status, own["noise"], own)
-        weights = [
-            _nearness(j, index) / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
-            for j in trusted
-        ]
         value = self._mean(trusted, weights)
         status = "ok" if value <= LONGEST else "beyond"
         return Exposure(value, status, own["noise"], own)
+
+    def _scatter(self, frames: list[int], weights: list[float]) -> float:
+        """Return the standard deviation of log s over frames."""
+        logs = np.log([self._found(j)["value"] for j in frames])
+        mean = np.average(logs, weights=weights)
+        return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
 
     def _mean(self, frames: list[int], weights: list[float]) -> float:
         logs = [np.log(self._found(j)["value"]) for j in frames]

@@ -1,0 +1,53 @@
+"""Exposures of a clip: what its frames agree on, and what not."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from unsmear.restoration.clip_exposure import ClipExposure
+from unsmear.restoration.memo import Memo
+
+
+def exposure(monkeypatch: pytest.MonkeyPatch, found: list[tuple[float, str]]) -> Any:
+    """Return the exposure of the middle frame of a clip in which these are found."""
+
+    def search(_self: ClipExposure, index: int) -> dict[str, Any]:
+        value, status = found[index]
+        return {"value": value, "status": status, "spread": 0.02, "noise": 1.0}
+
+    monkeypatch.setattr(ClipExposure, "_search", search)
+    source: Any = SimpleNamespace(count=len(found))
+    nothing: Any = None
+    clip = ClipExposure(source, nothing, Memo(), given=None, noise=None, seed=0)
+    return clip.exposure(len(found) // 2)
+
+
+def test_what_frames_agree_on_is_smoothed(monkeypatch: pytest.MonkeyPatch) -> None:
+    values = [0.44, 0.52, 0.5, 0.47, 0.55]
+    one = exposure(monkeypatch, [(value, "ok") for value in values])
+    assert one.status == "ok"
+    assert 0.47 < one.value < 0.53
+
+
+def test_a_shutter_that_jumps_about_is_not_believed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # As found in a shaken page of print, exposed for the whole interval.
+    values = [0.13, 1.28, 1.4, 0.25, 0.2]
+    one = exposure(monkeypatch, [(value, "ok") for value in values])
+    assert (one.value, one.status) == (1.0, "unsure")
+
+
+def test_unsure_frames_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = [(0.13, "unsure"), (0.5, "ok"), (0.5, "ok"), (0.5, "ok"), (1.0, "unsure")]
+    one = exposure(monkeypatch, found)
+    assert one.status == "ok"
+    assert one.value == pytest.approx(0.5)
+
+
+def test_alone_among_unsure_ones_is_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = [(0.4, "unsure")] * 2 + [(1.2, "ok")] + [(0.4, "unsure")] * 2
+    one = exposure(monkeypatch, found)
+    assert (one.value, one.status) == (1.0, "unsure")
