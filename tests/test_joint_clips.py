@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import unsmear
 from unsmear import synthetic
 from unsmear.restoration.agreement import agreed
+from unsmear.restoration.clip_exposure import ClipExposure, Exposure
 from unsmear.restoration.sampling import pulled
 
 SHAPE = (112, 112)
@@ -70,6 +72,21 @@ def test_frames_blurred_alike_still_help_each_other(
         assert report["neighbours_weight"] > 0.5
         assert report["kept_alone"] < 0.1
         json.dumps(report, allow_nan=False)
+
+
+def test_a_neighbour_may_be_hardly_blurred(
+    monkeypatch: pytest.MonkeyPatch, pan: synthetic.Sequence
+) -> None:
+    found = ClipExposure.exposure
+
+    def exposure(self: ClipExposure, index: int) -> Exposure:
+        one = found(self, index)
+        return replace(one, status="small") if index == 2 else one
+
+    monkeypatch.setattr(ClipExposure, "exposure", exposure)
+    result = unsmear.deblur_sequence(pan.blurred, indices=[1, 2])
+    assert result.reports[0]["neighbours_weight"] > 0.5
+    assert "neighbours_weight" not in result.reports[1]
 
 
 def test_restored_clips_do_not_flicker(

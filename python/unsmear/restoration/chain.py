@@ -16,8 +16,10 @@ import numpy as np
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.looks import (
+    LINES,
     NEXT,
     SHARP_STRENGTH,
+    SPLINE,
     TWIN,
     WALK,
     cropped,
@@ -234,7 +236,9 @@ class Chain:
         twins tell.
         """
         noise = self._exposure.exposure(index).noise
-        looks = [self._walks.look(index)]
+        # The exposures that are assumed of short blur were found with lines.
+        small = self._exposure.exposure(index).status == "small"
+        looks = [self._walks.look(index, LINES if small else SPLINE)]
         pictures, pad = self._walks.pictures(index)
         if len(looks[0]["planes"]) > 1:
             way = (strength,) if strength <= WALK[TWIN] else (WALK[TWIN], strength)

@@ -76,11 +76,8 @@ class Walks:
         """Return the grey level from which samples of a frame are clipped light."""
         return self._walk(index)[2]
 
-    def look(self, index: int) -> Look:
+    def look(self, index: int, taps: str = SPLINE) -> Look:
         """Return the solver's look at all channels of a frame."""
-        # The exposures that are assumed of short blur were found with lines.
-        small = self._exposure.exposure(index).status == "small"
-        taps = LINES if small else SPLINE
         return self._look(index, self._source.planes(index), self.ceiling(index), taps)
 
     def _look(
