@@ -3,8 +3,9 @@ Several frames for one
 ======================
 
 Neighbouring frames of a clip show the same scene with other noise, and where the motion
-changes, with other gaps in the spectrum. ``joint=3`` restores from three frames at
-once; where a neighbour does not show what the restoration predicts, it is left out.
+changes, with other gaps in the spectrum. ``joint=3``, the default, restores from three
+frames at once; where a neighbour does not show what the restoration predicts, it is
+left out.
 """
 
 import matplotlib.pyplot as plt

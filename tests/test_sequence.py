@@ -140,6 +140,15 @@ def test_memory_spares_what_guides_the_next_pass() -> None:
     assert ("again", 3) not in made
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_frame_of_which_nothing_is_known_comes_back_so() -> None:
+    frames = np.random.default_rng(0).random((3, 40, 50), np.float32)
+    frames[1] = np.nan
+    result = unsmear.deblur_sequence(frames)
+    np.testing.assert_array_equal(result.frames, frames)
+    assert [report["blur_px"] for report in result.reports] == [None] * 3
+
+
 def test_bad_input_is_named(pan: synthetic.Sequence) -> None:
     frames = pan.blurred
     for options, words in [

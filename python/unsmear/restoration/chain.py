@@ -172,6 +172,7 @@ class Chain:
         motion = self.motion.motion(index)
         planes = self._source.planes(index)
         blur = exposure.value * np.linalg.norm(motion.velocity, axis=-1)
+        known = blur[np.isfinite(blur)]
         report: dict[str, Any] = {
             "index": index,
             "exposure": exposure.value,
@@ -182,7 +183,7 @@ class Chain:
                 if name not in ("noise", "turn")
             },
             "noise": exposure.noise / self._source.scale,
-            "blur_px": float(np.nanpercentile(blur, 95)) if blur.size else 0.0,
+            "blur_px": float(np.percentile(known, 95)) if known.size else None,
         }
         if not (np.nan_to_num(blur) > 0).any() or not self._twins(index).moving.any():
             nothing = np.zeros(blur.shape, bool)

@@ -55,7 +55,8 @@ def still(own: Plane, others: list[tuple[Plane, Field]]) -> NDArray[np.bool_]:
     others : list of (ndarray like ``own``, ndarray of shape (H, W, 2))
         Each neighbour with the flow to it, px; NaN = unknown, and never still.
     """
-    least = LEAST_POWER * np.nan_to_num(np.nanvar(own))
+    seen = own[np.isfinite(own)].astype(np.float64)
+    least = LEAST_POWER * float(seen.var()) if seen.size else 0.0
     worst = np.zeros(own.shape)
     moves = np.zeros(own.shape, bool)
     at_rest = []
