@@ -80,7 +80,8 @@ def neighbour(
         back = unsmear.optical_flow(pair[::-1], index=0).flow
         seen = seen_in(way, back, np.ones(velocity.shape[:2], np.float32))
         offset = settled(alone[k], alone[middle], way, seen)
-    motion = Motion(velocity, np.zeros_like(velocity), None, None)
+    steady = velocity, np.zeros_like(velocity)
+    motion = Motion(*steady, steady, None, None)
     planes = series.blurred[k].astype(np.float32)[np.newaxis]
     made = Neighbour(planes, motion, 1.0, offset, seen, WHITE)
     return made, error(way, series.offset[k])

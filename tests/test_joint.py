@@ -40,7 +40,8 @@ def own(series: ExposureSeries) -> Any:
 
 def neighbour(series: ExposureSeries, k: int) -> Neighbour:
     velocity, offset = series.velocity[k], series.offset[k].copy()
-    motion = Motion(velocity, np.zeros_like(velocity), None, None)
+    steady = velocity, np.zeros_like(velocity)
+    motion = Motion(*steady, steady, None, None)
     planes = series.blurred[k].astype(np.float32)[np.newaxis]
     return Neighbour(planes, motion, 1.0, offset, inside(offset).astype(np.float32))
 
@@ -116,7 +117,8 @@ def test_different_blurs_complete_each_other(series: ExposureSeries) -> None:
 
 def test_copies_are_one_frame_with_less_noise(series: ExposureSeries) -> None:
     grain = [series.with_noise(NOISE, seed) for seed in (1, 2, 3)]
-    motion = Motion(series.velocity[1], 0 * series.velocity[1], None, None)
+    steady = series.velocity[1], 0 * series.velocity[1]
+    motion = Motion(*steady, steady, None, None)
     copies = [
         Neighbour(
             one.blurred[1].astype(np.float32)[np.newaxis],

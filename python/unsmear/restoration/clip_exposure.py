@@ -110,12 +110,12 @@ class ClipExposure:
 
     def _likeliest(self, index: int, noise: float | None) -> dict[str, Any]:
         frames = self._around(index, POOLED)
-        motions = [self._motion.motion(j) for j in frames]
+        motions = [self._motion.motion(j).everywhere for j in frames]
         return dict(
             _unsmear.estimate_exposure(
                 np.stack([self._source.luma(j) for j in frames]),
-                _stack([motion.velocity for motion in motions]),
-                _stack([motion.acceleration for motion in motions]),
+                _stack([velocity for velocity, _ in motions]),
+                _stack([acceleration for _, acceleration in motions]),
                 LIMITS,
                 noise,
                 self._seed + index,

@@ -55,12 +55,16 @@ class Motion:
     ----------
     velocity, acceleration : ndarray of shape (H, W, 2), float32
         px/frame and px/frame^2, felt by the content. Velocity NaN = unknown.
+    everywhere : tuple of two ndarrays of shape (H, W, 2)
+        Both as flow says, on ground at rest too (`stillness`): smooth, as those need
+        them who look at whole tiles.
     forward, backward : ndarray of shape (H, W, 2) or None
         Flows to the next frame and to the one before.
     """
 
     velocity: Field
     acceleration: Field
+    everywhere: tuple[Field, Field]
     forward: Field | None
     backward: Field | None
 
@@ -141,10 +145,12 @@ class ClipMotion:
         ways = ((index + 1, forward), (index - 1, backward))
         others = [(self._luma(j), way) for j, way in ways if way is not None]
         rest = still(self._luma(index), others)[..., np.newaxis]
-        velocity, acceleration = (
-            np.where(rest, np.float32(0), field) for field in (velocity, acceleration)
-        )
-        return Motion(velocity, acceleration, forward, backward)
+        everywhere = velocity, acceleration
+        if rest.any():
+            velocity, acceleration = (
+                np.where(rest, np.float32(0), field) for field in everywhere
+            )
+        return Motion(velocity, acceleration, everywhere, forward, backward)
 
     def _luma(self, index: int) -> NDArray[np.float32]:
         frame = np.asarray(self._guide(index), np.float64)
