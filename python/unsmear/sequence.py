@@ -90,9 +90,9 @@ def deblur_sequence(
     joint : {3, 1}, default 3
         Frames restored together: 3 uses the neighbours' data too. Frames blurred alike
         come out 1 to 4 dB better, frames blurred in different directions more (4.7 dB
-        where their blur is known), and with less flicker than as they came; in half as
-        much time again for a whole clip. Frames whose exposure is not sure, or that are
-        blurred by less than about 3 px, are restored by themselves, as are all by 1.
+        where their blur is known), and with less flicker than as they came; in about
+        twice the time. Frames whose exposure is not sure, or that are blurred by less
+        than about 3 px, are restored by themselves, as are all by 1.
     second_pass : bool, optional
         Measure flow again on restored frames, up to three passes in all, as long as
         restored frames agree better. Default: for frames whose acceleration exceeds a
@@ -125,13 +125,15 @@ def deblur_sequence(
     :math:`D = -t s v + t^2 s^2 (2 (v \cdot \nabla) v - A) / 2`, velocity
     :math:`v = (f - g)/2` and acceleration :math:`A = f + g` from the flows f, g to
     both neighbours, s the exposure. x minimises
-    :math:`\frac12 \sum w \rho(A x - b) + \lambda TV(x)`.
+    :math:`\frac12 \sum_n w_n \rho(A_n x - b_n) + \lambda R(x)` over the frames n that are
+    restored together.
 
     Needs motion between 1 px and a tenth of the picture per frame. Blur that is not
     motion (focus), rolling shutters and strong compression are not modelled: the
     verdict then leaves frames as they are, or should. Black bars are no picture: they
-    come back as they were. White samples of integer frames may have been brighter than
-    they could say; where a restoration shows that they were not, they are white.
+    come back as they were, and so does ground at rest beside what moves. White samples
+    of integer frames may have been brighter than they could say; where a restoration
+    shows that they were not, they are white.
 
     References
     ----------

@@ -62,7 +62,7 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
         choices=JOINT,
         default=3,
         help="frames restored together by the method auto; default %(default)s, and 1 "
-        "takes two thirds of the time",
+        "takes half the time",
     )
     verb.add_argument(
         "--noise", type=float, help="standard deviation; default measured"
