@@ -125,8 +125,8 @@ def deblur_sequence(
     :math:`D = -t s v + t^2 s^2 (2 (v \cdot \nabla) v - A) / 2`, velocity
     :math:`v = (f - g)/2` and acceleration :math:`A = f + g` from the flows f, g to
     both neighbours, s the exposure. x minimises
-    :math:`\frac12 \sum_n w_n \rho(A_n x - b_n) + \lambda R(x)` over the frames n that are
-    restored together.
+    :math:`\frac12 \sum_n w_n \rho(A_n x - b_n) + \lambda R(x)` over the frames n that
+    are restored together.
 
     Needs motion between 1 px and a tenth of the picture per frame. Blur that is not
     motion (focus), rolling shutters and strong compression are not modelled: the
