@@ -237,9 +237,7 @@ class Chain:
         twins tell.
         """
         noise = self._exposure.exposure(index).noise
-        # The exposures that are assumed of short blur were found with lines.
-        small = self._exposure.exposure(index).status == "small"
-        looks = [self._walks.look(index, LINES if small else SPLINE)]
+        looks = [self._walks.look(index, self._taps(index))]
         pictures, pad = self._walks.pictures(index)
         if len(looks[0]["planes"]) > 1:
             way = (strength,) if strength <= WALK[TWIN] else (WALK[TWIN], strength)
@@ -267,6 +265,16 @@ class Chain:
         if scores[0] < SHARPER * scores[1]:
             return pictures[-1], pad, True
         return cautious, pad, False
+
+    def _taps(self, index: int) -> str:
+        """Return those of a frame restored by itself.
+
+        Lines are enough where several frames start from it, and right where blur is
+        short: the exposures that are assumed there were found with them.
+        """
+        status = self._exposure.exposure(index).status
+        joined = self._settings.joint > 1 and JOINED[status] == np.inf
+        return LINES if joined or status == "small" else SPLINE
 
     @staticmethod
     def _composed(
