@@ -16,7 +16,9 @@ softly,
     local(p) = sqrt((G e_x + k E_x) / (G e_b + k E_b)),
 
 G a Gaussian of 12 px, E the region's means. What blurs by less than 0.3 px is returned
-as it came, bit for bit, fading in up to 0.6 px.
+as it came, bit for bit, fading in up to 0.6 px. So is, from 3 to 6 px on, what moves
+far in a frame in which hardly anything does: the exposure that is assumed there was
+assumed for short blur, and a fast thing alone does not tell its own.
 """
 
 from __future__ import annotations
@@ -73,7 +75,10 @@ def judge(
     blurred: Plane, restored: Plane, against: Twins, blur: Plane, status: str
 ) -> Verdict:
     """Judge a restoration; ``blur`` is the length of blur (px) of every pixel."""
-    fade = np.clip((np.nan_to_num(blur) - STILL) / (FULL - STILL), 0.0, 1.0)
+    length = np.nan_to_num(blur)
+    fade = np.clip((length - STILL) / (FULL - STILL), 0.0, 1.0)
+    if status == "small":
+        fade *= np.clip((LONG_BLUR - length) / (LONG_BLUR - SHORT_BLUR), 0.0, 1.0)
     own, input_ = errors(restored, against), errors(blurred, against)
     known = np.isfinite(own) & np.isfinite(input_)
     labels, count = _unsmear.regions(against.moving)
@@ -160,7 +165,7 @@ def _words(ratio: float, found: list[dict[str, Any]], status: str) -> dict[str, 
     gain = None
     if used and np.isfinite(ratio):
         # Both restorations err by s, independently: e_x = 2 s^2, e_b = b^2 + s^2.
-        gain = round(float(10 * np.log10(max(2 / ratio**2 - 1, 0.1))), 1)
+        gain = round(float(10 * np.log10(max(2 / max(ratio, 1e-3) ** 2 - 1, 0.1))), 1)
     risk = "none" if not used else "low"
     if used and (not np.isfinite(ratio) or ratio > HIGH_RISK):
         risk = "high"
