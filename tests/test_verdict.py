@@ -23,3 +23,4 @@ def test_an_exposure_assumed_for_short_blur_is_used_for_that(
     assert (verdict.share[:, 5:40] == 1).all()
     assert (verdict.share[:, 40:] == far).all()
     assert (verdict.share[:, :5] == 0).all()
+    assert ("exposure is not known" in verdict.report["verdict"]) == (far == 0)

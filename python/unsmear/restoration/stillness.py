@@ -61,10 +61,9 @@ def still(own: Plane, others: list[tuple[Plane, Field]]) -> NDArray[np.bool_]:
     moves = np.zeros(own.shape, bool)
     at_rest = []
     for other, way in others:
-        unknown = ~(np.isfinite(own) & np.isfinite(other))
-        holes = pulled(_unsmear.dilated(unknown, MARGIN).astype(np.float32), way, 1)
+        holes = _unsmear.dilated(~(np.isfinite(own) & np.isfinite(other)), MARGIN)
         # Compared where both can be: a place that leaves the picture says nothing.
-        known = (holes == 0) & ~_unsmear.dilated(unknown, MARGIN)
+        known = ~holes & (pulled(holes.astype(np.float32), way, degree=1) == 0)
         rest, flow = (
             smoothed(
                 np.where(known, (there - own.astype(np.float64)) ** 2, 0), SMOOTHING

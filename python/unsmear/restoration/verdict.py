@@ -98,6 +98,7 @@ def judge(
         found.append(one | {"used": bool(used)})
         if used:
             share[region] = _locally(own, input_, compared)[region]
+    left = bool(((share > 0) & (fade == 0) & (length > LONG_BLUR)).any())
     share *= fade
     ratio = _ratio(own, input_, known)
     report = {
@@ -106,6 +107,11 @@ def judge(
         "used_share": float((share > 0).mean()),
         **_words(ratio, found, status),
     }
+    if left:
+        report["verdict"] += (
+            f"; what is blurred by more than {LONG_BLUR:.0f} px as it was, for its "
+            "exposure is not known"
+        )
     return Verdict(share.astype(np.float32), ratio, report)
 
 
