@@ -13,8 +13,8 @@
 //!    (`vote.rs`).
 //!
 //! s also takes up a common error of scale of the flow: what is found is the blur, s v; if asked, also how far the flow
-//! points beside it (`direction.rs`). Trust: "ok" when 70 % of the plausible kinds agree, the spread is at most 0.06 and
-//! the optimum lies inside the range. Otherwise "unsure", s the median of the kinds' optima, 1 at most, for blur assumed
+//! points beside it (`direction.rs`). Trust: "ok" when 70 % of the plausible kinds agree, the spread is at most 0.06, there
+//! are eight tiles at least and the optimum lies inside the range. Otherwise "unsure", s the median of the kinds' optima, 1 at most, for blur assumed
 //! too short does little harm and blur assumed too long does much.
 //! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
 //! fits it by chance. Blur too short for zeros, or for enough tiles to show them for sure where nearly nothing moves by
@@ -60,6 +60,9 @@ const GREY_LEVELS: f64 = 255.0;
 
 /// Least vote and greatest spread of an estimate to be relied on.
 const TRUST: (f64, f64) = (0.7, 0.06);
+
+/// Tiles below which an estimate is not relied on: a few, which show one thing, agree on the gaps of its own spectrum.
+const LEAST_TILES: usize = 8;
 
 /// Greatest s while unsure.
 const MOST_UNSURE: f64 = 1.0;
@@ -213,7 +216,8 @@ impl ExposureSearch {
     /// Whether the likeliest share can be relied on.
     fn trusts(&self, found: &Found) -> bool {
         let credible = (self.range.0..=self.range.1).contains(&found.log_scale.exp());
-        found.inside && credible && found.vote >= TRUST.0 && found.spread <= TRUST.1
+        let agree = found.vote >= TRUST.0 && found.spread <= TRUST.1;
+        found.inside && credible && agree && found.tiles >= LEAST_TILES
     }
 
     fn validate<T: Real>(&self, frames: &[ExposureFrame<'_, T>]) -> Result<()> {

@@ -1,6 +1,7 @@
 //! Which tiles of the frames are used: a random hundred of those that tell something, large ones where motion is large.
 //!
-//! Corners lie half a tile apart. A fixed seed puts them in an order, in which they are looked at until enough have
+//! Corners lie half a tile apart, those of the smallest tiles a quarter if that is not enough: a small mover has few
+//! places for a tile that holds nothing else. A fixed seed puts them in an order, in which they are looked at until enough have
 //! been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
 
 use ndarray::s;
@@ -22,6 +23,8 @@ const BATCH: usize = 128;
 struct Size {
     /// px.
     side: usize,
+    /// Between corners, px.
+    step: usize,
     /// Shorter side of the smallest picture that is cut up so, px.
     shortest: usize,
     /// Slowest picture, by the median of its speeds, px/frame.
@@ -31,11 +34,12 @@ struct Size {
 }
 
 /// Sizes, the greatest first: zeros of a blur of over half a tile run into each other.
-const SIZES: [Size; 4] = [
-    Size { side: 128, shortest: 288, slowest: 20.0, most: 28 },
-    Size { side: 64, shortest: 256, slowest: 0.0, most: 100 },
-    Size { side: 48, shortest: 96, slowest: 0.0, most: 100 },
-    Size { side: 32, shortest: 32, slowest: 0.0, most: 100 },
+const SIZES: [Size; 5] = [
+    Size { side: 128, step: 64, shortest: 288, slowest: 20.0, most: 28 },
+    Size { side: 64, step: 32, shortest: 256, slowest: 0.0, most: 100 },
+    Size { side: 48, step: 24, shortest: 96, slowest: 0.0, most: 100 },
+    Size { side: 32, step: 16, shortest: 32, slowest: 0.0, most: 100 },
+    Size { side: 32, step: 8, shortest: 32, slowest: 0.0, most: 100 },
 ];
 
 /// Every so many px in both directions the speed is looked at for the median.
@@ -66,7 +70,7 @@ pub(super) fn choose_tiles<T: Real>(
             continue;
         }
         let waves = Waves::new(size.side);
-        let tiles = tiles_of(frames, &waves, size.most, (noise, least_speed), random, control)?;
+        let tiles = tiles_of(frames, &waves, &size, (noise, least_speed), random, control)?;
         if tiles.len() > best.as_ref().map_or(0, |(_, most)| most.len()) {
             best = Some((waves, tiles));
         }
@@ -90,18 +94,18 @@ fn median_speed<T: Real>(frames: &[ExposureFrame<'_, T>]) -> f64 {
     speeds.get(speeds.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// At most `most` tiles faster than `least_speed` (px/frame) that tell something.
+/// Tiles of a size, at most as many as it says, faster than `least_speed` (px/frame) that tell something.
 fn tiles_of<T: Real>(
     frames: &[ExposureFrame<'_, T>],
     waves: &Waves,
-    most: usize,
+    size: &Size,
     (noise, least_speed): (f64, f64),
     random: &mut Random,
     control: &Control,
 ) -> Result<Vec<Tile>> {
-    let side = waves.side;
+    let (side, most) = (size.side, size.most);
     let (height, width) = frames[0].image.dim();
-    let starts = |n: usize| (0..=n - side).step_by(side / 2);
+    let starts = |n: usize| (0..=n - side).step_by(size.step);
     let mut corners: Vec<(usize, [usize; 2])> = (0..frames.len())
         .flat_map(|n| starts(height).map(move |top| (n, top)))
         .flat_map(|(n, top)| starts(width).map(move |left| (n, [top, left])))
