@@ -10,12 +10,20 @@ from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.memo import Memo
 
 
-def exposure(monkeypatch: pytest.MonkeyPatch, found: list[tuple[float, str]]) -> Any:
+def exposure(
+    monkeypatch: pytest.MonkeyPatch, found: list[tuple[float, str]], tiles: int = 40
+) -> Any:
     """Return the exposure of the middle frame of a clip in which these are found."""
 
     def search(_self: ClipExposure, index: int) -> dict[str, Any]:
         value, status = found[index]
-        return {"value": value, "status": status, "spread": 0.02, "noise": 1.0}
+        return {
+            "value": value,
+            "status": status,
+            "spread": 0.02,
+            "noise": 1.0,
+            "tiles": tiles,
+        }
 
     monkeypatch.setattr(ClipExposure, "_search", search)
     source: Any = SimpleNamespace(count=len(found))
@@ -51,3 +59,27 @@ def test_alone_among_unsure_ones_is_not_enough(monkeypatch: pytest.MonkeyPatch) 
     found = [(0.4, "unsure")] * 2 + [(1.2, "ok")] + [(0.4, "unsure")] * 2
     one = exposure(monkeypatch, found)
     assert (one.value, one.status) == (1.0, "unsure")
+
+
+def test_no_shutter_is_open_for_longer_than_the_interval(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    used = {
+        value: exposure(monkeypatch, [(value, "ok")] * 5).value
+        for value in (0.9, 1.0, 1.04, 1.09, 1.15, 1.3)
+    }
+    assert used[0.9] == pytest.approx(0.9)
+    assert used[1.0] == used[1.04] == used[1.09] == 1.0
+    # A greater error is one of the flow, which exposure takes up.
+    assert 1.0 < used[1.15] < 1.15
+    assert used[1.3] == pytest.approx(1.3)
+
+
+def test_a_few_tiles_do_not_show_what_no_shutter_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # As found on a car of 30 px in a street at rest.
+    found = [(1.7, "ok")] * 5
+    few, many = (exposure(monkeypatch, found, tiles) for tiles in (5, 40))
+    assert (few.value, few.status) == (1.0, "unsure")
+    assert (many.value, many.status) == (pytest.approx(1.7), "beyond")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from unsmear.restoration.boundaries import believed
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.looks import (
@@ -209,8 +210,7 @@ class Chain:
             **verdict.report,
         }
         alone = Alone(single, pad, strength, verdict.share)
-        restored = cropped(single, pad)
-        return self._composed(planes, restored, alone, report, verdict.ratio)
+        return self._composed(index, (single, pad), alone, report, verdict.ratio)
 
     def joined(self, index: int) -> Restored:
         """Return a restored frame with what its neighbours saw of it.
@@ -225,10 +225,9 @@ class Chain:
             return before
         if not before.ratio < JOINED[before.report["exposure_status"]]:
             return before
-        picture, more = self._several.restored(index)
-        planes = self._source.planes(index)
+        picture, pad, more = self._several.restored(index)
         report = before.report | more
-        return self._composed(planes, picture, alone, report, before.ratio)
+        return self._composed(index, (picture, pad), alone, report, before.ratio)
 
     def _single(self, index: int, strength: float) -> tuple[Planes, int, bool]:
         """Return the frame restored by itself, padded, and whether sharply.
@@ -276,15 +275,16 @@ class Chain:
         joined = self._settings.joint > 1 and JOINED[status] == np.inf
         return LINES if joined or status == "small" else SPLINE
 
-    @staticmethod
     def _composed(
-        planes: Planes,
-        picture: Planes,
+        self,
+        index: int,
+        padded: tuple[Planes, int],
         alone: Alone,
         report: dict[str, Any],
         ratio: float,
     ) -> Restored:
-        share = alone.share
+        planes = self._source.planes(index)
+        share = alone.share * believed(self._walks.look(index), *padded)
         changed = (share > 0) & np.isfinite(planes).all(axis=0)
-        mixed = planes + share * (picture - planes)
+        mixed = planes + share * (cropped(*padded) - planes)
         return Restored(np.where(changed, mixed, planes), changed, ratio, report, alone)

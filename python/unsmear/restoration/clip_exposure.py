@@ -5,10 +5,12 @@ how sharp they are,
 
     log s = sum w_j log s_j / sum w_j,   w_j = (1 - |j - i| / 3) / (spread_j^2 + .02^2),
 
-so that a shutter that stays as it is gives an exposure that stays as it is. Where less
-than half of them can be relied on, or those scatter by more than a shutter that stays
-as it is, none can, and the frame's own cautious value is used; where it is
-cautious because blur is short, the mean over frames like it, by how near they are.
+so that a shutter that stays as it is gives an exposure that stays as it is. Found a
+little above 1 it is 1: recorded clips open all the time are found at 1.04 to 1.09, and
+gain 1 to 4 dB from the truth. Where less than half of them can be relied on, or those
+scatter by more than a shutter that stays as it is, none can, and the frame's own
+cautious value is used; where it is cautious because blur is short, the mean over frames
+like it, by how near they are.
 
 Codecs leave out what is weaker than their steps. Of H.264 at usual settings (crf 17 to
 28) the search then made nothing. It says "unsure" with hardly any blur for likeliest,
@@ -173,8 +175,9 @@ def _is_credible(found: dict[str, Any]) -> bool:
 
 def _of_shutter(found: float) -> float:
     """Return the exposure to use: no shutter is open for longer than the interval."""
-    near, far = 1.0 + ERROR, 1.0 + 2 * ERROR
-    return float(np.interp(found, (1.0, near, far), (1.0, 1.0, far))) if 1.0 < found < far else found
+    last = LIMITS[1]
+    from_, to = (0.0, 1.0, 1 + ERROR, 1 + 2 * ERROR, last), (0.0, 1.0, 1.0)
+    return float(np.interp(found, from_, (*to, 1 + 2 * ERROR, last)))
 
 
 def _looks_coded(found: dict[str, Any]) -> bool:

@@ -59,8 +59,11 @@ class SeveralFrames:
         self._reach = reach
         self._memo = Memo()
 
-    def restored(self, index: int) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Return the channels (C, H, W) of a frame that is blurred, and a report."""
+    def restored(self, index: int) -> tuple[NDArray[np.float32], int, dict[str, Any]]:
+        """Return the channels of a frame that is blurred, padded, the pad and a report.
+
+        The channels have shape (C, H + 2 pad, W + 2 pad).
+        """
         joint, registered = self._joint(index)
         near = []
         for other in registered:
@@ -71,8 +74,10 @@ class SeveralFrames:
                 seen = seen * pulled(theirs.share, way, degree=1)
                 near.append((cropped(found.picture, found.pad), way, seen))
         own = cropped(joint.picture, joint.pad)
+        picture, inner = joint.picture.copy(), slice(joint.pad, -joint.pad or None)
+        picture[:, inner, inner] = agreed(own, near, self._noise(index))
         report = {"neighbours_weight": joint.weight, "kept_alone": joint.kept}
-        return agreed(own, near, self._noise(index)), report
+        return picture, joint.pad, report
 
     def _joint(self, index: int) -> tuple[Joint, dict[int, Neighbour]]:
         """Return the joint restoration, and the neighbours registered to it."""

@@ -124,6 +124,27 @@ fn a_scene_with_directions_of_its_own_is_not_taken_for_blur() {
     assert!((estimate.likeliest - 1.0).abs() < 0.04, "{estimate:?}");
 }
 
+/// Flow of a square of `side` px in the middle of a scene at rest.
+fn moving_square(side: usize, length: f64) -> FlowField<f64> {
+    let (top, left) = ((SHAPE.0 - side) / 2 + 3, (SHAPE.1 - side) / 2 - 5);
+    let inside =
+        |(y, x): (usize, usize)| (top..top + side).contains(&y) && (left..left + side).contains(&x);
+    let u = Array2::from_shape_fn(SHAPE, |at| if inside(at) { length } else { 0.0 });
+    FlowField::new(u, Array2::zeros(SHAPE)).unwrap()
+}
+
+#[test]
+fn a_small_mover_is_read_from_tiles_close_together_and_a_few_are_not_relied_on() {
+    // The picture is blurred all over, so that any tile would tell; only those where the flow says so are asked.
+    let image = blurred(7.0, 0.0, 0.5);
+    let estimate = found(&image, &moving_square(60, 7.0), (0.06, 1.25));
+    assert_eq!(estimate.status, ExposureStatus::Ok);
+    assert!((estimate.value - 1.0).abs() < 0.04, "{}", estimate.value);
+    let estimate = found(&image, &moving_square(36, 7.0), (0.06, 1.25));
+    assert!(estimate.tiles < LEAST_TILES);
+    assert_ne!(estimate.status, ExposureStatus::Ok);
+}
+
 #[test]
 fn contrast_and_brightness_do_not_matter() {
     let image = blurred(9.0, 0.6, 0.5);
