@@ -11,14 +11,19 @@ from unsmear.restoration.memo import Memo
 
 
 def exposure(
-    monkeypatch: pytest.MonkeyPatch, found: list[tuple[float, str]], tiles: int = 40
+    monkeypatch: pytest.MonkeyPatch,
+    found: list[tuple[float, str]],
+    tiles: int = 40,
+    vote: float = 0.5,
 ) -> Any:
     """Return the exposure of the middle frame of a clip in which these are found."""
 
     def search(_self: ClipExposure, index: int) -> dict[str, Any]:
         value, status = found[index]
         return {
-            "value": value,
+            "value": value if status == "ok" else 0.4,
+            "likeliest": value,
+            "vote": vote,
             "status": status,
             "spread": 0.02,
             "noise": 1.0,
@@ -83,3 +88,22 @@ def test_a_few_tiles_do_not_show_what_no_shutter_does(
     few, many = (exposure(monkeypatch, found, tiles) for tiles in (5, 40))
     assert (few.value, few.status) == (1.0, "unsure")
     assert (many.value, many.status) == (pytest.approx(1.7), "beyond")
+
+
+def test_frames_that_are_nearly_sure_count_if_they_agree(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # As found in a page of print that turns.
+    agree = [(value, "unsure") for value in (1.02, 1.02, 1.02, 1.0, 1.01)]
+    one = exposure(monkeypatch, agree, vote=0.67)
+    assert (one.value, one.status) == (1.0, "ok")
+    one = exposure(monkeypatch, agree, vote=0.5)
+    assert (one.value, one.status) == (0.4, "unsure")
+    one = exposure(monkeypatch, agree, tiles=8, vote=0.67)
+    assert (one.value, one.status) == (0.4, "unsure")
+    at_the_end = [(0.051, "unsure")] * 5
+    one = exposure(monkeypatch, at_the_end, vote=1.0)
+    assert (one.value, one.status) == (0.4, "unsure")
+    scattered = [(value, "unsure") for value in (0.9, 0.75, 1.02, 0.8, 1.01)]
+    one = exposure(monkeypatch, scattered, vote=0.67)
+    assert (one.value, one.status) == (0.4, "unsure")

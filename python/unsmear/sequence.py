@@ -185,7 +185,7 @@ def restored_frames(
     others = Alternatives(source, settings)
     for index in wanted:
         result, chain, number = passes.best(index, second_pass)
-        if result.report["exposure_status"] == "unsure" and result.changed.any():
+        if result.report["exposure_status"] == "unsure":
             result, chain = others.best(index, result, chain)
         result = chain.joined(index) if result.changed.any() else result
         picture = source.as_came(result.planes, index, result.changed)

@@ -23,6 +23,8 @@ LONGEST = 1.0
 """No shutter is open for more: longer ones cost a small mover 1 to 4 dB."""
 LEAST_BLUR = 4.0
 """Blur (95 % quantile, px) from which twins tell exposures apart at all."""
+CONVINCING = 0.9
+"""Ratio below which one is used of a frame that would otherwise be left as it came."""
 MOST_CHAINS = 4
 
 
@@ -48,7 +50,7 @@ class Alternatives:
         self, index: int, result: Restored, chain: Chain
     ) -> tuple[Restored, Chain]:
         """Return the restoration its twins, or the search among equals, speak for."""
-        if result.report["blur_px"] < LEAST_BLUR:
+        if result.alone is None or result.report["blur_px"] < LEAST_BLUR:
             return result, chain
         value = result.report["exposure"]
         likeliest = result.report["exposure_found"]["likeliest"]
@@ -60,7 +62,8 @@ class Alternatives:
                 continue
             other = self._chain(exposure)
             restored = other.restored(index)
-            if restored.changed.any():
+            convincing = result.changed.any() or restored.ratio < CONVINCING
+            if restored.changed.any() and convincing:
                 tried.append((exposure, restored, other))
         limit = AS_GOOD * min(one.ratio for _, one, _ in tried)
         if not found:

@@ -28,6 +28,8 @@ import numpy as np
 from unsmear import _unsmear
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from unsmear.restoration.clip_motion import ClipMotion
@@ -54,6 +56,8 @@ LEAST_SPREAD = 0.02
 GREATEST_SCATTER = 0.25
 """Of log s over the frames around one. Those of shaken clips scatter by .1, those found
 in lines of print, which have gaps of their own in their spectra, by .4 and more."""
+NEARLY, LEAST_SCATTER = 0.6, 0.05
+"""Vote of frames that are nearly sure, and how far they may scatter."""
 
 
 @dataclass(frozen=True)
@@ -138,13 +142,10 @@ class ClipExposure:
         if self._given is not None:
             return Exposure(self._given, "given", own["noise"], own)
         near = self._around(index, SMOOTHED)
-        trusted = [j for j in near if _is_credible(self._found(j))]
-        weights = [
-            _nearness(j, index) / (self._found(j)["spread"] ** 2 + LEAST_SPREAD**2)
-            for j in trusted
-        ]
-        many = 2 * len(trusted) >= len(near)
-        if not (many and self._scatter(trusted, weights) <= GREATEST_SCATTER):
+        value = self._agreed(index, near, _sure, GREATEST_SCATTER)
+        if value is None:
+            value = self._agreed(index, near, _nearly_sure, LEAST_SCATTER)
+        if value is None:
             value, status = own["value"], own["status"]
             if status == "ok":
                 value, status = min(value, 1.0), "unsure"
@@ -152,25 +153,56 @@ class ClipExposure:
                 alike = [j for j in near if self._found(j)["status"] == "small"]
                 value = self._mean(alike, [_nearness(j, index) for j in alike])
             return Exposure(float(value), status, own["noise"], own)
-        value = _of_shutter(self._mean(trusted, weights))
+        value = _of_shutter(value)
         status = "ok" if value <= LONGEST else "beyond"
         return Exposure(value, status, own["noise"], own)
 
-    def _scatter(self, frames: list[int], weights: list[float]) -> float:
-        """Return the standard deviation of log s over frames."""
-        logs = np.log([self._found(j)["value"] for j in frames])
+    def _agreed(
+        self,
+        index: int,
+        near: range,
+        reading: Callable[[dict[str, Any]], float | None],
+        limit: float,
+    ) -> float | None:
+        """Return what half of the frames at least say, if it scatters little."""
+        logs, weights = [], []
+        for j in near:
+            found = self._found(j)
+            value = reading(found)
+            if value is not None:
+                logs.append(np.log(value))
+                spread = found["spread"] ** 2 + LEAST_SPREAD**2
+                weights.append(_nearness(j, index) / spread)
+        if 2 * len(logs) < len(near):
+            return None
         mean = np.average(logs, weights=weights)
-        return float(np.sqrt(np.average((logs - mean) ** 2, weights=weights)))
+        scatter = np.sqrt(np.average((np.array(logs) - mean) ** 2, weights=weights))
+        return float(np.exp(mean)) if scatter <= limit else None
 
     def _mean(self, frames: list[int], weights: list[float]) -> float:
         logs = [np.log(self._found(j)["value"]) for j in frames]
         return float(np.exp(np.average(logs, weights=weights)))
 
 
-def _is_credible(found: dict[str, Any]) -> bool:
-    """Return whether what the search said can be relied on."""
+def _sure(found: dict[str, Any]) -> float | None:
+    """Return what the search found, if that can be relied on."""
     possible = found["value"] <= LONGEST or found["tiles"] >= MANY_TILES
-    return bool(found["status"] == "ok" and possible)
+    return float(found["value"]) if found["status"] == "ok" and possible else None
+
+
+def _nearly_sure(found: dict[str, Any]) -> float | None:
+    """Return what is likeliest where a third of the kinds of scene say otherwise.
+
+    Believed only of many tiles that agree, and if frames do: print has gaps of its own
+    in its spectrum, which some kinds of scene take for those of blur.
+    """
+    value = _sure(found)
+    if value is not None or found["status"] != "unsure":
+        return value
+    alike = found["tiles"] >= MANY_TILES and found["spread"] <= LEAST_SPREAD
+    inside = LIMITS[0] < found["likeliest"] <= LONGEST
+    sure = alike and found["vote"] >= NEARLY and inside
+    return float(found["likeliest"]) if sure else None
 
 
 def _of_shutter(found: float) -> float:
