@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from unsmear.restoration import alternatives as module
 from unsmear.restoration.alternatives import Alternatives
-from unsmear.restoration.records import Restored, Settings
+from unsmear.restoration.records import Alone, Restored, Settings
 
 SETTINGS = Settings(None, None, "balanced", {}, 1, 0)
 
@@ -19,6 +19,8 @@ def frame(
     exposure: float,
     likeliest: float | None = None,
     blur: float = 9.0,
+    *,
+    used: bool = True,
 ) -> Restored:
     report: dict[str, Any] = {
         "exposure": exposure,
@@ -26,8 +28,9 @@ def frame(
         "exposure_status": "unsure",
         "exposure_found": {"likeliest": likeliest},
     }
-    changed, planes = np.ones((2, 2), bool), np.zeros((1, 2, 2), np.float32)
-    return Restored(planes, changed, ratio, report)
+    changed, planes = np.full((2, 2), used), np.zeros((1, 2, 2), np.float32)
+    alone = Alone(planes, 0, 0.1, np.ones((2, 2), np.float32))
+    return Restored(planes, changed, ratio, report, alone)
 
 
 @pytest.mark.parametrize(
@@ -68,6 +71,26 @@ def test_ratios_and_the_search_decide(
     assert best.report["exposure"] == expected
     assert best.report["exposure_status"] == "unsure"
     assert (chain is own) == (expected == 1.0)
+
+
+@pytest.mark.parametrize(("ratio", "used"), [(0.95, False), (0.85, True)])
+def test_of_a_frame_left_as_it_came_only_what_convinces_is_used(
+    monkeypatch: pytest.MonkeyPatch, ratio: float, *, used: bool
+) -> None:
+    # Its neighbours may have been restored by a wrong exposure, not it.
+    def chain(_source: Any, _guide: Any, settings: Settings) -> Any:
+        exposure = settings.exposure
+        assert exposure is not None
+        return SimpleNamespace(restored=lambda _: frame(ratio, exposure))
+
+    monkeypatch.setattr(module, "Chain", chain)
+    source: Any = SimpleNamespace(guide=None)
+    others = Alternatives(source, SETTINGS)
+    left, own = frame(1.2, 0.8, 1.0, used=False), object()
+    any_chain: Any = own
+    best, _ = others.best(0, left, any_chain)
+    assert best.changed.any() == used
+    assert best.report["exposure"] == (1.0 if used else 0.8)
 
 
 def test_of_short_blur_twins_know_nothing() -> None:

@@ -74,7 +74,8 @@ def test_no_shutter_is_open_for_longer_than_the_interval(
         for value in (0.9, 1.0, 1.04, 1.09, 1.15, 1.3)
     }
     assert used[0.9] == pytest.approx(0.9)
-    assert used[1.0] == used[1.04] == used[1.09] == 1.0
+    assert used[1.0] == pytest.approx(1.0)
+    assert used[1.04] == used[1.09] == pytest.approx(1.012)
     # A greater error is one of the flow, which exposure takes up.
     assert 1.0 < used[1.15] < 1.15
     assert used[1.3] == pytest.approx(1.3)
@@ -96,7 +97,8 @@ def test_frames_that_are_nearly_sure_count_if_they_agree(
     # As found in a page of print that turns.
     agree = [(value, "unsure") for value in (1.02, 1.02, 1.02, 1.0, 1.01)]
     one = exposure(monkeypatch, agree, vote=0.67)
-    assert (one.value, one.status) == (1.0, "ok")
+    assert one.status == "ok"
+    assert 1.0 < one.value <= 1.012
     one = exposure(monkeypatch, agree, vote=0.5)
     assert (one.value, one.status) == (0.4, "unsure")
     one = exposure(monkeypatch, agree, tiles=8, vote=0.67)
