@@ -7,10 +7,10 @@ how sharp they are,
 
 so that a shutter that stays as it is gives an exposure that stays as it is. Found a
 little above 1 it is as good as 1: recorded clips open all the time are found at 1.04 to
-1.09, and gain 1 to 4 dB from the truth. Where less than half of them can be relied on, or those
-scatter by more than a shutter that stays as it is, none can, and the frame's own
-cautious value is used; where it is cautious because blur is short, the mean over frames
-like it, by how near they are.
+1.09, and gain 1 to 4 dB from the truth. Where less than half of them can be relied on,
+or those scatter by more than a shutter that stays as it is, none can, and the frame's
+own cautious value is used; where it is cautious because blur is short, the mean over
+frames like it, by how near they are.
 
 Codecs leave out what is weaker than their steps. Of H.264 at usual settings (crf 17 to
 28) the search then made nothing. It says "unsure" with hardly any blur for likeliest,
