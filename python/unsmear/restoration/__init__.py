@@ -13,6 +13,7 @@
 | walks          | every frame restored with growing strength of the prior         |
 | twin_frames    | how well a restored frame predicts its neighbours' restorations |
 | verdict        | what to use, where, in words                                    |
+| boundaries     | what a restoration is worth where two motions meet              |
 | chain          | the order of the steps                                          |
 | passes         | flow measured again on restored frames                          |
 | alternatives   | other exposures, where the search was not sure                  |
