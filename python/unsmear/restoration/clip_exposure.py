@@ -46,9 +46,9 @@ WHOLE = 1.012
 too short: 1.006 to 1.018 of a recorded clip and four of photographs."""
 ERROR = 0.1
 """By which an exposure of 1 may be found too long; twice that is another one."""
-MANY_TILES = 12
-"""Of which an exposure longer than that is believed. A few tiles show one thing, whose
-own spectrum may have a gap: a car of 30 px gave exposures from 1.6 to 2.3."""
+MANY_TILES = 32
+"""Of which an exposure longer than that is believed. Fewer show one thing, whose own
+spectrum may have a gap: cars of 30 px gave exposures from 1.6 to 2.3."""
 CODED_NOISE = (3.0, 5.0)
 """Noise, grey levels, below which a codec may have taken away what was recorded."""
 CODED_LIKELIEST = 0.2

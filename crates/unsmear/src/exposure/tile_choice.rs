@@ -27,19 +27,33 @@ struct Size {
     step: usize,
     /// Shorter side of the smallest picture that is cut up so, px.
     shortest: usize,
-    /// Slowest picture, by the median of its speeds, px/frame.
-    slowest: f64,
+    /// Slowest and fastest picture, by the median of its speeds, px/frame.
+    speeds: (f64, f64),
+    /// Not tried if larger ones gave so many.
+    unless: usize,
     /// Most tiles used: beyond them the model, not the number of tiles, limits what is found.
     most: usize,
 }
 
-/// Sizes, the greatest first: zeros of a blur of over half a tile run into each other.
-const SIZES: [Size; 5] = [
-    Size { side: 128, step: 64, shortest: 288, slowest: 20.0, most: 28 },
-    Size { side: 64, step: 32, shortest: 256, slowest: 0.0, most: 100 },
-    Size { side: 48, step: 24, shortest: 96, slowest: 0.0, most: 100 },
-    Size { side: 32, step: 16, shortest: 32, slowest: 0.0, most: 100 },
-    Size { side: 32, step: 8, shortest: 32, slowest: 0.0, most: 100 },
+/// No limit to a speed.
+const ANY: f64 = f64::INFINITY;
+
+/// Sizes, the greatest first: zeros of a blur of over half a tile run into each other. The least are for small movers
+/// before a scene at rest.
+const SIZES: [Size; 6] = [
+    Size {
+        side: 128,
+        step: 64,
+        shortest: 288,
+        speeds: (20.0, ANY),
+        unless: ENOUGH_TILES,
+        most: 28,
+    },
+    Size { side: 64, step: 32, shortest: 256, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
+    Size { side: 48, step: 24, shortest: 96, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
+    Size { side: 32, step: 16, shortest: 32, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
+    Size { side: 32, step: 8, shortest: 32, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
+    Size { side: 24, step: 6, shortest: 32, speeds: (0.0, 1.0), unless: 5, most: 100 },
 ];
 
 /// Every so many px in both directions the speed is looked at for the median.
@@ -66,16 +80,16 @@ pub(super) fn choose_tiles<T: Real>(
     let mut best: Option<(Waves, Vec<Tile>)> = None;
     let speed = median_speed(frames);
     for size in SIZES {
-        if height.min(width) < size.shortest || !(speed >= size.slowest) {
+        if best.as_ref().is_some_and(|(_, most)| most.len() >= size.unless) {
+            break;
+        }
+        if height.min(width) < size.shortest || !(size.speeds.0..=size.speeds.1).contains(&speed) {
             continue;
         }
         let waves = Waves::new(size.side);
         let tiles = tiles_of(frames, &waves, &size, (noise, least_speed), random, control)?;
         if tiles.len() > best.as_ref().map_or(0, |(_, most)| most.len()) {
             best = Some((waves, tiles));
-        }
-        if best.as_ref().is_some_and(|(_, most)| most.len() >= ENOUGH_TILES) {
-            break;
         }
     }
     Ok(best)
