@@ -35,9 +35,10 @@ class ExposureEstimate:
         Share of the frame interval; what was found if ``status`` is "ok", else a
         cautious value, for blur taken too short does little harm.
     status : {"ok", "unsure", "small"}
-        "unsure": parts of the picture or assumptions about it disagree, or nothing
-        could be measured; "small": because hardly anything moves by 3 px, so that no
-        wave is missing and only how far they are dimmed tells, from .4 to .8.
+        "unsure": parts of the picture or assumptions about it disagree, there are
+        less than eight parts, or nothing could be measured; "small": because hardly
+        anything moves by 3 px, so that no wave is missing and only how far they are
+        dimmed tells, from .4 to .8.
     vote : float
         Share, in [0, 1], of those of ten assumptions on the scene's spectrum that
         explain it nearly as well as the best and agree with it; NaN without tiles.

@@ -33,8 +33,10 @@ class Alternatives:
 
     Twin frames err alike under a wrong exposure and hardly notice a small error of it;
     half as much again they do. Of those as good to them as the best the one next to
-    what the search found likeliest is taken. Of blur without gaps in its spectrum twins
-    know nothing: they would take the longest for the best, and lose 1 to 8 dB.
+    what the search found likeliest is taken. A frame that would be left as it came may
+    only have had neighbours restored by a wrong exposure: of it they are tried too. Of
+    blur without gaps in its spectrum twins know nothing: they would take the longest
+    for the best, and lose 1 to 8 dB.
     """
 
     def __init__(

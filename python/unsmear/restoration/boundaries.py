@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear.restoration.looks import cropped
+from unsmear.restoration.looks import cropped, limited_squares
 from unsmear.restoration.sampling import smoothed
 
 if TYPE_CHECKING:
@@ -36,11 +36,12 @@ if TYPE_CHECKING:
 __all__ = ["believed"]
 
 SMOOTHING = 1.5
-GREATEST_ERROR = 20.0
 LEAST_CHANGE = 0.5
 """Grey levels: less does not matter either way."""
 SHORT_BLUR, LONG_BLUR = 2.0, 4.0
+"""px. Ends at 5 and 6 px gave .01 and .03 dB less on average."""
 OF_SHORT, OF_LONG = (0.25, 0.5), (0.5, 1.0)
+"""q from which and at which at last the frame is shown, for short and long blur."""
 
 
 def believed(look: Look, picture: Planes, pad: int) -> Plane:
@@ -58,6 +59,7 @@ def believed(look: Look, picture: Planes, pad: int) -> Plane:
     Returns
     -------
     ndarray of shape (H, W), float32
+        Unknown samples neither speak for a restoration nor against it.
     """
     meets = look["weights"] <= 0
     if not meets.any():
@@ -65,7 +67,7 @@ def believed(look: Look, picture: Planes, pad: int) -> Plane:
     planes = look["planes"]
     predicted = _unsmear.record_look(look, picture, pad)
     unexplained, changed = (
-        np.sqrt(smoothed(_limited(one - planes), SMOOTHING))
+        np.sqrt(smoothed(limited_squares(one - planes, unknown=0.0), SMOOTHING))
         for one in (predicted, cropped(picture, pad))
     )
     quotient = unexplained / np.maximum(changed, LEAST_CHANGE)
@@ -74,9 +76,3 @@ def believed(look: Look, picture: Planes, pad: int) -> Plane:
     low, high = (a + long * (b - a) for a, b in zip(OF_SHORT, OF_LONG, strict=True))
     share = np.clip((high - quotient) / (high - low), 0.0, 1.0)
     return np.where(meets, share, 1.0).astype(np.float32)
-
-
-def _limited(error: Planes) -> NDArray[np.float64]:
-    """Return the mean over channels of squared errors, limited; unknown ones are 0."""
-    square = (np.nan_to_num(error).astype(np.float64) ** 2).mean(axis=0)
-    return np.asarray(np.minimum(square, GREATEST_ERROR**2))

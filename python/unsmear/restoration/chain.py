@@ -286,5 +286,6 @@ class Chain:
         planes = self._source.planes(index)
         share = alone.share * believed(self._walks.look(index), *padded)
         changed = (share > 0) & np.isfinite(planes).all(axis=0)
+        report = report | {"used_share": float(changed.mean())}
         mixed = planes + share * (cropped(*padded) - planes)
         return Restored(np.where(changed, mixed, planes), changed, ratio, report, alone)

@@ -59,8 +59,9 @@ LEAST_SPREAD = 0.02
 GREATEST_SCATTER = 0.25
 """Of log s over the frames around one. Those of shaken clips scatter by .1, those found
 in lines of print, which have gaps of their own in their spectra, by .4 and more."""
-NEARLY, LEAST_SCATTER = 0.6, 0.05
-"""Vote of frames that are nearly sure, and how far they may scatter."""
+NEARLY, CLOSE_SCATTER = 0.6, 0.05
+"""Least vote of frames that are nearly sure, and how far they may scatter: two of three
+plausible kinds of scene, and as far as the exposure of a clip is read wrong at all."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class ClipExposure:
         near = self._around(index, SMOOTHED)
         value = self._agreed(index, near, _sure, GREATEST_SCATTER)
         if value is None:
-            value = self._agreed(index, near, _nearly_sure, LEAST_SCATTER)
+            value = self._agreed(index, near, _nearly_sure, CLOSE_SCATTER)
         if value is None:
             value, status = own["value"], own["status"]
             if status == "ok":

@@ -39,7 +39,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unsmear import _unsmear
-from unsmear.restoration.looks import SHARP_STRENGTH, Look, cropped, look, walk
+from unsmear.restoration.looks import (
+    GREATEST_ERROR,
+    SHARP_STRENGTH,
+    Look,
+    cropped,
+    limited_squares,
+    look,
+    walk,
+)
 from unsmear.restoration.registration import settled
 from unsmear.restoration.sampling import carried, pulled_field, smoothed
 from unsmear.restoration.source import Source
@@ -55,7 +63,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Joint", "Neighbour", "restore_jointly"]
 
-GREATEST_ERROR = 20.0
 SMOOTHING = 6.0
 STRENGTH_EXPONENT = 0.5
 ROUNDS = ((2, 12), (3, 12))
@@ -208,9 +215,7 @@ def _explained(
 def _errors(at: Look, picture: Planes, pad: int) -> NDArray[np.float64]:
     """Return (A x - b)^2, limited, as the mean of the channels; (H, W)."""
     predicted = _unsmear.record_look(at, picture, pad)
-    error = ((predicted - at["planes"]) ** 2).mean(axis=0, dtype=np.float64)
-    most = GREATEST_ERROR**2
-    return np.asarray(np.minimum(np.nan_to_num(error, nan=most), most))
+    return limited_squares(predicted - at["planes"], unknown=GREATEST_ERROR)
 
 
 def _padded(picture: Planes, more: int) -> Planes:

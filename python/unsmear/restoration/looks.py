@@ -11,7 +11,7 @@ from unsmear import _unsmear
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Look", "cropped", "look", "robust_scale", "walk"]
+__all__ = ["Look", "cropped", "limited_squares", "look", "robust_scale", "walk"]
 
 WALK = (0.015, 0.045, 0.13, 0.4)
 """Strengths of the prior that are compared, grey levels."""
@@ -31,6 +31,9 @@ up to twice the time; or line by line, which damps the finest detail."""
 
 NEXT = (3, 12)
 """Turns and steps of one that starts from another of nearly the same strength."""
+
+GREATEST_ERROR = 20.0
+"""Grey levels beyond which samples do not differ more: another scene, not an error."""
 
 
 class Look(TypedDict):
@@ -103,6 +106,18 @@ def walk(
         start,
     )
     return pictures, pad
+
+
+def limited_squares(
+    difference: NDArray[np.float32], unknown: float
+) -> NDArray[np.float64]:
+    """Return squares as the mean of the channels (C, H, W), limited; (H, W).
+
+    ``unknown`` grey levels are what NaN differs by.
+    """
+    mean = (difference**2).mean(axis=0, dtype=np.float64)
+    known = np.nan_to_num(mean, nan=unknown**2)
+    return np.asarray(np.minimum(known, GREATEST_ERROR**2))
 
 
 def cropped(picture: NDArray[np.float32], pad: int) -> NDArray[np.float32]:

@@ -104,7 +104,6 @@ def judge(
     report = {
         "ratio": _plain(ratio),
         "regions": sorted(found, key=lambda one: -one["pixels"]),
-        "used_share": float((share > 0).mean()),
         **_words(ratio, found, status),
     }
     if left:

@@ -4,7 +4,7 @@
 //! zeros in the spectrum of each part of a blurred picture, at waves with w . (s v) = 2 pi n. One s is sought for a
 //! whole picture or clip:
 //!
-//! 1. tiles of 64 px (48 or 32 in small pictures or for small movers, 128 for large motion) with one motion and enough
+//! 1. tiles of 64 px (48 or 32 in small pictures, 32 or 24 for small movers, 128 for large motion) with one motion and enough
 //!    contrast (`tile.rs`, `tile_choice.rs`);
 //! 2. for each, Whittle's likelihood over a grid of s (`likelihood.rs`), least over twelve shapes of the scene's spectrum
 //!    (`scene.rs`), with paths of constant acceleration (`path_spectrum.rs`); tiles whose blur at s is shorter than 2.4 px
@@ -13,9 +13,9 @@
 //!    (`vote.rs`).
 //!
 //! s also takes up a common error of scale of the flow: what is found is the blur, s v; if asked, also how far the flow
-//! points beside it (`direction.rs`). Trust: "ok" when 70 % of the plausible kinds agree, the spread is at most 0.06, there
-//! are eight tiles at least and the optimum lies inside the range. Otherwise "unsure", s the median of the kinds' optima, 1 at most, for blur assumed
-//! too short does little harm and blur assumed too long does much.
+//! points beside it (`direction.rs`). Trust: "ok" when 70 % of the plausible kinds agree, the spread is at most 0.06,
+//! there are eight tiles at least and the optimum lies inside the range. Otherwise "unsure", s the median of the kinds'
+//! optima, 1 at most, for blur assumed too short does little harm and blur assumed too long does much.
 //! The range should reach down to shutters that hardly blur: among long blurs only, a sharp picture finds one that
 //! fits it by chance. Blur too short for zeros, or for enough tiles to show them for sure where nearly nothing moves by
 //! 3 px, is told roughly by how much it dims (`short_blur.rs`), which "small" says; without any tile s is 0.8.

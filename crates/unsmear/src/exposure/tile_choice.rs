@@ -1,8 +1,8 @@
 //! Which tiles of the frames are used: a random hundred of those that tell something, large ones where motion is large.
 //!
 //! Corners lie half a tile apart, those of the smallest tiles a quarter if that is not enough: a small mover has few
-//! places for a tile that holds nothing else. A fixed seed puts them in an order, in which they are looked at until enough have
-//! been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
+//! places for a tile that holds nothing else. A fixed seed puts them in an order, in which they are looked at until
+//! enough have been found; so a long clip costs no more than a picture, and the same call finds the same tiles.
 
 use ndarray::s;
 use rayon::prelude::*;
@@ -38,6 +38,13 @@ struct Size {
 /// No limit to a speed.
 const ANY: f64 = f64::INFINITY;
 
+/// Median speed of a scene that is mostly at rest, px/frame.
+const AT_REST: f64 = 1.0;
+
+/// Tiles of 32 px from which those of 24 are not tried: seven read a blur of 15 px, of which the smaller, though more,
+/// know nothing.
+const FEW_TILES: usize = 5;
+
 /// Sizes, the greatest first: zeros of a blur of over half a tile run into each other. The least are for small movers
 /// before a scene at rest.
 const SIZES: [Size; 6] = [
@@ -53,7 +60,7 @@ const SIZES: [Size; 6] = [
     Size { side: 48, step: 24, shortest: 96, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
     Size { side: 32, step: 16, shortest: 32, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
     Size { side: 32, step: 8, shortest: 32, speeds: (0.0, ANY), unless: ENOUGH_TILES, most: 100 },
-    Size { side: 24, step: 6, shortest: 32, speeds: (0.0, 1.0), unless: 5, most: 100 },
+    Size { side: 24, step: 6, shortest: 32, speeds: (0.0, AT_REST), unless: FEW_TILES, most: 100 },
 ];
 
 /// Every so many px in both directions the speed is looked at for the median.
