@@ -42,8 +42,8 @@ class SequenceResult:
     reports : list of dict
         One per frame, plain data: exposure and the trust in it, noise, strength of
         the prior, the verdict in words (``verdict``, ``expected_gain_db``,
-        ``ringing_risk``), per moving region too, widths of black ``bars`` (px), and
-        all parameters.
+        ``ringing_risk``), per moving region too, widths of black ``bars`` (px), how far
+        odd lines lie below their place (``line_pairing``, px), and all parameters.
     """
 
     frames: NDArray[Any]
@@ -131,9 +131,10 @@ def deblur_sequence(
     Needs motion between 1 px and a tenth of the picture per frame. Blur that is not
     motion (focus), rolling shutters and strong compression are not modelled: the
     verdict then leaves frames as they are, or should. Black bars are no picture: they
-    come back as they were, and so does ground at rest beside what moves. White samples
-    of integer frames may have been brighter than they could say; where a restoration
-    shows that they were not, they are white.
+    come back as they were, and so does ground at rest beside what moves. Lines of
+    interlaced frames that lie closer in pairs than they should are restored, and shown,
+    where they lie. White samples of integer frames may have been brighter than they
+    could say; where a restoration shows that they were not, they are white.
 
     References
     ----------

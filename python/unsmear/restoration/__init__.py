@@ -9,6 +9,7 @@
 | stillness      | what stands still although flow says that it moves              |
 | clip_motion    | velocity and acceleration of every frame                        |
 | clip_exposure  | exposure of every frame, smoothed in time                       |
+| line_pairing   | lines of interlaced frames that lie closer in pairs             |
 | clipping       | whether what is clipped was brighter than white                 |
 | walks          | every frame restored with growing strength of the prior         |
 | twin_frames    | how well a restored frame predicts its neighbours' restorations |

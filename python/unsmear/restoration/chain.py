@@ -16,6 +16,7 @@ import numpy as np
 from unsmear.restoration.boundaries import believed
 from unsmear.restoration.clip_exposure import ClipExposure
 from unsmear.restoration.clip_motion import ClipMotion
+from unsmear.restoration.line_pairing import LinePairing, as_recorded
 from unsmear.restoration.looks import (
     LINES,
     NEXT,
@@ -93,11 +94,15 @@ class Chain:
             noise=settings.noise,
             seed=settings.seed,
         )
-        self._walks = Walks(source, self.motion, self._exposure, self._memo)
+        self._lines = LinePairing(source, self._memo)
+        self._walks = Walks(
+            source, self.motion, self._exposure, self._lines, self._memo
+        )
         neighbours = Neighbours(
             source,
             self.motion,
             self._exposure,
+            self._lines,
             self._walks,
             method=settings.flow_method,
             options=settings.flow_options,
@@ -184,6 +189,7 @@ class Chain:
                 if name not in ("noise", "turn")
             },
             "noise": exposure.noise / self._source.scale,
+            "line_pairing": self._lines.offset(index),
             "blur_px": float(np.percentile(known, 95)) if known.size else None,
         }
         if not (np.nan_to_num(blur) > 0).any() or not self._twins(index).moving.any():
@@ -192,9 +198,10 @@ class Chain:
             return Restored(planes, nothing, float("nan"), report)
         strength = self._strength(index)
         single, pad, sharp = self._single(index, strength)
-        luma = self._source.luma
+        luma = self._source.luma(index)[np.newaxis]
         verdict = judge(
-            luma(index),
+            # To first order the inverse, as even as the restorations.
+            as_recorded(luma, 0, -self._lines.offset(index))[0],
             self._source.luma_of(cropped(single, pad)),
             self._twins(index),
             blur,
@@ -287,5 +294,6 @@ class Chain:
         share = alone.share * believed(self._walks.look(index), *padded)
         changed = (share > 0) & np.isfinite(planes).all(axis=0)
         report = report | {"used_share": float(changed.mean())}
-        mixed = planes + share * (cropped(*padded) - planes)
+        shown = as_recorded(*padded, self._lines.offset(index))
+        mixed = planes + share * (shown - planes)
         return Restored(np.where(changed, mixed, planes), changed, ratio, report, alone)

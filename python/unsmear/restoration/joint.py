@@ -90,6 +90,8 @@ class Neighbour:
         How far its pixels are believed to show what the restored frame shows, [0, 1].
     ceiling : float or None
         Grey level from which its samples are clipped.
+    lines : ndarray of shape (H, W, 2) or None
+        Where its lines lie, px from their own place (`line_pairing`).
     """
 
     planes: Planes
@@ -98,6 +100,7 @@ class Neighbour:
     offset: Field
     seen: Plane
     ceiling: float | None = None
+    lines: Field | None = None
 
     def look(self, weights: Plane) -> Look:
         """Return the solver's look at it."""
@@ -107,7 +110,7 @@ class Neighbour:
             self.motion.acceleration,
             self.exposure,
             weights,
-            self.offset,
+            self.offset if self.lines is None else self.offset + self.lines,
             self.ceiling,
         )
 

@@ -16,6 +16,7 @@ import numpy as np
 from unsmear import _unsmear
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.joint import Neighbour
+from unsmear.restoration.line_pairing import line_offsets
 from unsmear.restoration.memo import Memo
 from unsmear.restoration.registration import settled
 from unsmear.restoration.sampling import composed, inside
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from unsmear.restoration.clip_exposure import ClipExposure
+    from unsmear.restoration.line_pairing import LinePairing
     from unsmear.restoration.source import Source
     from unsmear.restoration.walks import Walks
 
@@ -47,6 +49,8 @@ class Neighbours:
         What blurred its frames.
     exposure : ClipExposure
         Theirs.
+    lines : LinePairing
+        Where their lines lie.
     walks : Walks
         Its frames, restored by themselves.
     method : str
@@ -60,6 +64,7 @@ class Neighbours:
         source: Source,
         motion: ClipMotion,
         exposure: ClipExposure,
+        lines: LinePairing,
         walks: Walks,
         *,
         method: str,
@@ -68,6 +73,7 @@ class Neighbours:
         self._source = source
         self._motion = motion
         self._exposure = exposure
+        self._lines = lines
         self._walks = walks
         self._memo = Memo()
         self._between = ClipMotion(
@@ -103,6 +109,7 @@ class Neighbours:
             settled(self._walks.twin(other), self._walks.twin(index), way, seen),
             seen,
             self._walks.ceiling(other),
+            line_offsets(seen.shape, self._lines.offset(other)),
         )
 
     def forget_before(self, index: int) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.restoration.clipping import brighter_than_white
+from unsmear.restoration.line_pairing import line_offsets
 from unsmear.restoration.looks import (
     LINES,
     SPLINE,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from unsmear.restoration.clip_exposure import ClipExposure
     from unsmear.restoration.clip_motion import ClipMotion
+    from unsmear.restoration.line_pairing import LinePairing
     from unsmear.restoration.memo import Memo
     from unsmear.restoration.source import Source
 
@@ -50,16 +52,24 @@ class Walks:
         What blurred its frames.
     exposure : ClipExposure
         Theirs.
+    lines : LinePairing
+        Where their lines lie.
     memo : Memo
         Keeps what was computed.
     """
 
     def __init__(
-        self, source: Source, motion: ClipMotion, exposure: ClipExposure, memo: Memo
+        self,
+        source: Source,
+        motion: ClipMotion,
+        exposure: ClipExposure,
+        lines: LinePairing,
+        memo: Memo,
     ) -> None:
         self._source = source
         self._motion = motion
         self._exposure = exposure
+        self._lines = lines
         self._memo = memo
 
     def pictures(self, index: int) -> tuple[list[Planes], int]:
@@ -92,6 +102,7 @@ class Walks:
             motion.acceleration,
             exposure,
             visible,
+            line_offsets(visible.shape, self._lines.offset(index)),
             ceiling=ceiling,
             taps=taps,
         )
