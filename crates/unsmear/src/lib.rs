@@ -49,7 +49,7 @@
 //! | 3 | [`linear_operator`] | a blur and its transpose, as solvers see it |
 //! | 3 | `motion_operator::lanes`, `motion_operator::bands`, `motion_operator::spline_inverse`, `deblur::vectors` | arithmetic of pixels side by side, of pictures as vectors |
 //! | 4 | `motion_operator::record`, `motion_operator::strands`, `motion_operator::stencil` | |
-//! | 5 | `motion_operator::group` | |
+//! | 5 | `motion_operator::group`, `motion_operator::kept_stencils` | |
 //! | 6 | `motion_operator::scatter` | |
 //! | 12 | [`motion_path`], [`kernel_operator`] | paths; one kernel for the whole picture |
 //! | 13 | `motion_operator::plan`, `motion_operator::short_paths` | |

@@ -116,20 +116,32 @@ def affine_field(field: Field, weight: Plane) -> Field:
     Zero if less than three pixels are believed.
     """
     height, width = field.shape[:2]
-    y, x = np.mgrid[:height, :width] / max(height, width)
-    basis = np.stack([np.ones_like(x), x, y], axis=-1).reshape(-1, 3)
-    values = np.asarray(field, np.float64).reshape(-1, 2)
-    given = np.where(np.isfinite(values).all(axis=1), weight.ravel(), 0.0)
+    values = np.moveaxis(np.asarray(field, np.float64), -1, 0)
+    given = np.where(np.isfinite(values).all(axis=0), weight, 0.0)
     counts = given > 0
-    if counts.sum() < basis.shape[1]:
+    if counts.sum() < 3:
         return np.zeros_like(field)
     values = np.nan_to_num(values)
+    # Sums, not products of matrices: those depend on the number of threads.
+    y, x = (np.arange(count) / max(height, width) for count in (height, width))
     weights, fitted = given, values
     for _ in range(FIT_ROUNDS):
-        normal = (basis * weights[:, np.newaxis]).T
-        solution = np.linalg.lstsq(normal @ basis, normal @ values, rcond=None)[0]
-        fitted = basis @ solution
-        distance = np.linalg.norm(values - fitted, axis=1)
+        one, wx, wy = _moments(weights, y, x)
+        _, wxx, wxy = _moments(weights * x, y, x)
+        wyy = float((weights.sum(axis=1) * y**2).sum())
+        normal = np.array([[one, wx, wy], [wx, wxx, wxy], [wy, wxy, wyy]])
+        aim = np.array([_moments(weights * part, y, x) for part in values]).T
+        solution = np.linalg.lstsq(normal, aim, rcond=None)[0]
+        fitted = np.array([c + cx * x + (cy * y)[:, None] for c, cx, cy in solution.T])
+        distance = np.hypot(*(values - fitted))
         scale = max(2 * float(np.median(distance[counts])), LEAST_SCALE)
         weights = given / (1 + (distance / scale) ** 2)
-    return fitted.reshape(field.shape).astype(np.float32)
+    return np.ascontiguousarray(np.moveaxis(fitted, 0, -1), np.float32)
+
+
+def _moments(
+    plane: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return the sums of a plane (H, W), of it times x and of it times y."""
+    down, across = plane.sum(axis=1), plane.sum(axis=0)
+    return float(down.sum()), float((across * x).sum()), float((down * y).sum())

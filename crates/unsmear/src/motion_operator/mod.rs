@@ -32,6 +32,7 @@
 mod bands;
 mod expand;
 mod group;
+mod kept_stencils;
 mod lanes;
 mod plan;
 mod record;
@@ -113,6 +114,14 @@ impl MotionOperator {
         let reach = plans.iter().map(|plan| plan.reach).max().unwrap_or(0) + beyond;
         let reach = reach.max(short.as_ref().map_or(0, |short| short.reach));
         Ok(Self { plans, width, taps, pad, reach, short })
+    }
+
+    /// The operator for many applications: with splines it keeps what every step of a solver would make anew, up to 256
+    /// bytes per pixel and 256 MiB in all.
+    #[must_use]
+    pub fn for_many(mut self) -> Self {
+        self.short.iter_mut().for_each(ShortPaths::keep);
+        self
     }
 
     /// A x for a padding that clamps nothing.

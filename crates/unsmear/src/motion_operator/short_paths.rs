@@ -15,9 +15,10 @@
 //! [`LONGEST_OF_ITS_OWN`] where they differ.
 
 use super::bands::{Bands, each};
+use super::kept_stencils::KeptStencils;
 use super::lanes::{LANES, Lanes};
 use super::spline_inverse::spline_inverse;
-use super::stencil::{Paths, Stencil, gather, gauss, nodes_for, scatter};
+use super::stencil::{Paths, Stencil, Taken, gather, gauss, nodes_for, scatter};
 use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 use crate::tasks::{cut, runs};
@@ -54,6 +55,7 @@ pub(super) struct ShortPaths {
     pub(super) reach: usize,
     /// Whether all pixels are short.
     pub(super) everywhere: bool,
+    kept: KeptStencils,
 }
 
 impl ShortPaths {
@@ -93,7 +95,16 @@ impl ShortPaths {
         }
         let rules = (0..=nodes_for(longest)).map(gauss).collect();
         let reach = farthest.ceil() as usize + SPLINE_REACH;
-        Some(Self { width, planes, own, rules, reach, everywhere: count == height * width })
+        let everywhere = count == height * width;
+        Some(Self { width, planes, own, rules, reach, everywhere, kept: KeptStencils::default() })
+    }
+
+    /// Keeps stencils, for many applications.
+    pub(super) fn keep(&mut self) {
+        let shape = (self.own.len() / self.width, self.width);
+        let short = &*self;
+        let paths_of = |y| short.blocks(y).map(move |(x, own)| short.paths(y, x, &own));
+        self.kept = KeptStencils::new(shape, paths_of, &self.rules);
     }
 
     /// The paths that are left, the short ones still.
@@ -126,11 +137,10 @@ impl ShortPaths {
             let mut stencil = Stencil::default();
             for (y, out) in (first..).zip(rows.chunks_mut(self.width)) {
                 let start = bands.start(y);
-                for (column, own) in self.blocks(y) {
-                    stencil.renew(&self.paths(y, column, &own), &self.rules);
-                    let sum = gather(&stencil, &coefficients, start + column, bands.stride());
+                self.each_block(y, &mut stencil, |column, own, stencil| {
+                    let sum = gather(stencil, &coefficients, start + column, bands.stride());
                     put(&sum, &own, &mut out[column..]);
-                }
+                });
             }
         });
     }
@@ -142,11 +152,10 @@ impl ShortPaths {
         bands.for_each(&mut coefficients, rows, |first, place, rows| {
             let mut stencil = Stencil::default();
             for (i, row) in rows.chunks(self.width).enumerate() {
-                for (column, mut own) in self.blocks(first + i) {
-                    stencil.renew(&self.paths(first + i, column, &own), &self.rules);
+                self.each_block(first + i, &mut stencil, |column, mut own, stencil| {
                     own.0.iter_mut().zip(&row[column..]).for_each(|(own, r)| *own *= r);
-                    scatter(&stencil, &own, place, bands.place(i) + column, bands.stride());
-                }
+                    scatter(stencil, &own, place, bands.place(i) + column, bands.stride());
+                });
             }
         });
         spline_inverse(&coefficients, bands.stride(), x);
@@ -172,19 +181,36 @@ impl ShortPaths {
             let pairs = b.chunks_mut(self.width).zip(weights.chunks(self.width));
             for (i, (b, weights)) in pairs.enumerate() {
                 let start = bands.start(first + i);
-                for (column, mut own) in self.blocks(first + i) {
-                    stencil.renew(&self.paths(first + i, column, &own), &self.rules);
-                    let sum = gather(&stencil, &coefficients, start + column, stride);
+                self.each_block(first + i, &mut stencil, |column, mut own, stencil| {
+                    let sum = gather(stencil, &coefficients, start + column, stride);
                     put(&sum, &own, &mut b[column..]);
                     for ((own, sum), weight) in own.0.iter_mut().zip(sum.0).zip(&weights[column..])
                     {
                         *own *= weight * sum;
                     }
-                    scatter(&stencil, &own, place, bands.place(i) + column, stride);
-                }
+                    scatter(stencil, &own, place, bands.place(i) + column, stride);
+                });
             }
         });
         spline_inverse(&back, stride, out);
+    }
+
+    /// Visits the blocks of row `y` with short paths: first column, which of its pixels have one, stencil; `spare` is for
+    /// those not kept.
+    fn each_block(
+        &self,
+        y: usize,
+        spare: &mut Stencil,
+        mut visit: impl FnMut(usize, Lanes, &Taken<'_>),
+    ) {
+        for (i, (column, own)) in self.blocks(y).enumerate() {
+            if let Some(kept) = self.kept.get(y, i) {
+                visit(column, own, &kept);
+            } else {
+                spare.renew(&self.paths(y, column, &own), &self.rules);
+                visit(column, own, &spare.taken());
+            }
+        }
     }
 
     /// First columns of the blocks of row `y` with short paths, and which of their pixels have one.

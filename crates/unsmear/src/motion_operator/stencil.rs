@@ -47,16 +47,26 @@ pub(super) struct Stencil {
     taps: Vec<Lanes>,
 }
 
+/// A stencil that is ready to use.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Taken<'a> {
+    /// Column and row of the first coefficient, from the pixel.
+    pub(super) first: [i32; 2],
+    pub(super) rows: usize,
+    /// Column by column.
+    pub(super) taps: &'a [Lanes],
+}
+
 /// Nodes for a path of `length` px.
 pub(super) fn nodes_for(length: f32) -> usize {
     (0.7 * length + 2.5).ceil() as usize
 }
 
 impl Stencil {
-    /// Makes it that of `paths`, unless it is already. `rules` are Gauss' by their number of nodes.
-    pub(super) fn renew(&mut self, paths: &Paths, rules: &[Vec<[f32; 2]>]) {
+    /// Makes it that of `paths`; returns whether it was not already. `rules` are Gauss' by their number of nodes.
+    pub(super) fn renew(&mut self, paths: &Paths, rules: &[Vec<[f32; 2]>]) -> bool {
         if self.paths.as_ref().is_some_and(|before| alike(before, paths)) {
-            return;
+            return false;
         }
         let [u, v, qu, qv, ..] = paths;
         let squares =
@@ -68,6 +78,12 @@ impl Stencil {
         self.nodes.extend(rules[count].iter().map(|&rule| node(paths, rule)));
         self.paths = Some(*paths);
         build(self);
+        true
+    }
+
+    /// It, ready to use.
+    pub(super) fn taken(&self) -> Taken<'_> {
+        Taken { first: self.first, rows: self.rows, taps: &self.taps }
     }
 }
 
@@ -192,7 +208,7 @@ fn build(stencil: &mut Stencil) {
 }
 
 /// Where the first tap lies for the pixel at `place`.
-fn corner(stencil: &Stencil, place: usize, stride: usize) -> usize {
+fn corner(stencil: &Taken<'_>, place: usize, stride: usize) -> usize {
     let [column, row] = stencil.first.map(|z| z as isize);
     (place as isize + row * stride as isize + column) as usize
 }
@@ -200,7 +216,7 @@ fn corner(stencil: &Stencil, place: usize, stride: usize) -> usize {
 /// The stencil's sums for 16 pixels, the first of which is at `place`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn gather(
-    stencil: &Stencil,
+    stencil: &Taken<'_>,
     coefficients: &[f32],
     place: usize,
     stride: usize,
@@ -222,7 +238,7 @@ pub(super) fn gather(
 /// again, one sample beside, what it just wrote.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn scatter(
-    stencil: &Stencil,
+    stencil: &Taken<'_>,
     values: &Lanes,
     coefficients: &mut [f32],
     place: usize,

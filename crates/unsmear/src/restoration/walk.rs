@@ -63,7 +63,7 @@ impl Walk {
         });
         let operators = looks
             .iter()
-            .map(|look| MotionOperator::new(&look.paths, self.taps, pad))
+            .map(|look| Ok(MotionOperator::new(&look.paths, self.taps, pad)?.for_many()))
             .collect::<Result<Vec<_>>>()?;
         let data = looks
             .iter()

@@ -110,3 +110,28 @@ fn the_thrifty_leave_longer_paths_that_differ_to_lines() {
     // Neighbours that move alike share a stencil.
     assert_eq!(blur(Taps::ThriftySpline, 0.0), blur(Taps::Spline, 0.0));
 }
+
+#[test]
+fn what_is_kept_changes_no_byte() {
+    // The paths of later columns are too long for what a row keeps; some are not short, some still.
+    let shape = (20, 200);
+    let motion = field(shape, |x, y| match (x as u32, y as u32) {
+        (30..40, _) => [0.0, 0.0],
+        (_, 3) => [9.0, 1.0],
+        _ => [0.5 + 0.025 * x, 0.3 * y],
+    });
+    let paths = MotionPaths::new(&motion, 1.0, None).unwrap();
+    let made = MotionOperator::new(&paths, Taps::Spline, paths.reach() + 2).unwrap();
+    let kept = made.clone().for_many();
+    let (rows, columns) = made.unknown_shape();
+    let (x, r) = (noise(rows * columns, 1), noise(shape.0 * shape.1, 2));
+    let all = |operator: &MotionOperator| {
+        let (mut b, mut c) = (vec![0.0; r.len()], vec![0.0; r.len()]);
+        let (mut back, mut out) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+        operator.apply(&x, &mut b);
+        operator.adjoint(&r, &mut back);
+        operator.normal(&x, &r, &mut c, &mut out);
+        [b, back, c, out]
+    };
+    assert_eq!(all(&made), all(&kept));
+}
