@@ -9,8 +9,8 @@ use multiversion::multiversion;
 use super::group::Group;
 use super::lanes::{LANES, Lanes, Prepared, four_taps};
 use super::plan::{RowPlan, line_of};
-use super::record::{Kind, Line, Record};
-use super::strands::{Strand, Strands};
+use super::record::{Kind, Record};
+use super::strands::Strands;
 
 /// Added and subtracted, rounds to a whole number whatever is far smaller: 3/2 2^23.
 const WHOLE: f32 = 12_582_912.0;
@@ -22,9 +22,9 @@ pub(super) struct Expanded<const N: usize> {
     pub(super) weights: Vec<[Lanes; N]>,
     /// What they weigh begins so many samples to the right of a record's first pixel and so many below.
     pub(super) places: Vec<[i32; 2]>,
-    /// Where what is scattered goes, if they were found for these places.
+    /// Where what is scattered goes, if it was found for these places.
     strands: Strands,
-    found: bool,
+    found: Option<[u32; 2]>,
     /// The records' lanes that the weights are made from.
     lanes: Option<[u32; N]>,
     /// First line, lines and axis that the places are made from.
@@ -34,19 +34,12 @@ pub(super) struct Expanded<const N: usize> {
 impl<const N: usize> Expanded<N> {
     pub(super) fn new() -> Self {
         let (weights, places) = (Vec::new(), Vec::new());
-        Self {
-            weights,
-            places,
-            strands: Strands::default(),
-            found: false,
-            lanes: None,
-            shape: None,
-        }
+        Self { weights, places, strands: Strands::default(), found: None, lanes: None, shape: None }
     }
 
     /// Forgets what is written out: another row's plan follows.
     pub(super) fn forget(&mut self) {
-        (self.lanes, self.shape, self.found) = (None, None, false);
+        (self.lanes, self.shape, self.found) = (None, None, None);
     }
 
     /// Writes out the `records` of a `group` of `plan`, unless that is what was written out last.
@@ -71,8 +64,9 @@ impl<const N: usize> Expanded<N> {
         }
         if self.shape != shape {
             self.weights.resize(group.rows as usize, [Lanes::ZERO; N]);
-            self.set_places::<CUBIC>(group.lines_of(&plan.lines), group.first, lead.down);
-            self.found = false;
+            let reach = if CUBIC { 2 } else { 1 };
+            group.places(&plan.lines, reach, lead.down, &mut self.places);
+            self.found = None;
         }
         for (i, record) in records.iter().enumerate() {
             if i > 0 && record.lanes == records[i - 1].lanes {
@@ -84,23 +78,21 @@ impl<const N: usize> Expanded<N> {
         (self.shape, self.lanes) = (shape, lanes);
     }
 
-    /// Where what is scattered goes.
-    pub(super) fn strands(&mut self) -> &[Strand] {
-        if !self.found {
-            self.strands.find(&self.places);
-            self.found = true;
+    /// Where what is scattered goes: as the plan keeps it, or found for these places.
+    pub(super) fn strands<'a>(
+        &'a mut self,
+        plan: &'a RowPlan,
+        group: &Group,
+    ) -> (&'a Strands, [u32; 2]) {
+        if let Some(kept) = &plan.strands {
+            return (kept, group.strands);
         }
-        &self.strands.all
-    }
-
-    fn set_places<const CUBIC: bool>(&mut self, lines: &[Line], first: i16, down: bool) {
-        let (taps, before) = if CUBIC { (4, 1) } else { (2, 0) };
-        self.places.clear();
-        for (along, line) in (i32::from(first)..).zip(lines) {
-            let across = i32::from(line.floor) - before;
-            let across = across..across + taps + i32::from(line.span);
-            self.places.extend(across.map(|a| if down { [a, along] } else { [along, a] }));
-        }
+        let own = self.found.unwrap_or_else(|| {
+            self.strands.clear();
+            self.strands.find(&self.places)
+        });
+        self.found = Some(own);
+        (&self.strands, own)
     }
 }
 

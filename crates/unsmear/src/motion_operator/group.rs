@@ -26,12 +26,26 @@ pub(super) struct Group {
     pub(super) lines: u32,
     /// Rows of weights.
     pub(super) rows: u32,
+    /// Its strands in the row's, if they are kept.
+    pub(super) strands: [u32; 2],
 }
 
 impl Group {
     /// Its lines out of those of its row.
     pub(super) fn lines_of<'a>(&self, lines: &'a [Line]) -> &'a [Line] {
         &lines[self.lines as usize..][..usize::from(self.count)]
+    }
+
+    /// Where its rows of samples begin, so many samples to the right of its first pixel and so many below; `reach` of the
+    /// taps, along columns if `down`.
+    pub(super) fn places(&self, lines: &[Line], reach: usize, down: bool, out: &mut Vec<[i32; 2]>) {
+        let (taps, before) = (2 * reach as i32, reach as i32 - 1);
+        out.clear();
+        for (along, line) in (i32::from(self.first)..).zip(self.lines_of(lines)) {
+            let across = i32::from(line.floor) - before;
+            let across = across..across + taps + i32::from(line.span);
+            out.extend(across.map(|a| if down { [a, along] } else { [along, a] }));
+        }
     }
 }
 
@@ -50,6 +64,7 @@ pub(super) fn group(records: &mut [Record], lines: &mut Vec<Line>, taps: u32) ->
             count: lead.count,
             lines: lead.lines,
             rows: rows_of(lead.lines_of(lines), taps),
+            strands: [0; 2],
         };
         if let Some((first, joint)) = records[at..].first_chunk().and_then(|r| join(r, lines, taps))
         {

@@ -13,6 +13,7 @@ use multiversion::multiversion;
 use super::group::{Group, group};
 use super::lanes::{GENTLE, LANES, Lanes, Parabola, Prepared, Taps};
 use super::record::{Kind, Line, Record};
+use super::strands::Strands;
 use crate::flow_field::FlowField;
 use crate::motion_path::MotionPaths;
 
@@ -34,6 +35,8 @@ pub(super) struct RowPlan {
     pub(super) groups: Vec<Group>,
     pub(super) lines: Vec<Line>,
     pub(super) lanes: Vec<Lanes>,
+    /// Where what the groups scatter goes, if that is kept.
+    pub(super) strands: Option<Strands>,
     /// Rows or columns from a pixel to what it reads, at most.
     pub(super) reach: usize,
 }
@@ -76,6 +79,29 @@ impl RowPlan {
         plan.lines.shrink_to_fit();
         plan.lanes.shrink_to_fit();
         plan
+    }
+
+    /// The same, with the strands of all groups: found once where neighbours have the same lines.
+    pub(super) fn with_strands(mut self, taps: Taps) -> Self {
+        let (mut at, mut places, mut strands) = (0, Vec::new(), Strands::default());
+        let mut last = None;
+        for group in &mut self.groups {
+            let lead = &self.records[at];
+            at += usize::from(group.size);
+            let still = lead.kind == Kind::Still;
+            let shape = (still, group.first, group.lines, lead.down);
+            group.strands = match last {
+                Some((before, strands)) if before == shape => strands,
+                _ if still => strands.find(&[[0, 0]]),
+                _ => {
+                    group.places(&self.lines, taps.reach(), lead.down, &mut places);
+                    strands.find(&places)
+                }
+            };
+            last = Some((shape, group.strands));
+        }
+        self.strands = Some(strands.compact());
+        self
     }
 
     /// A record without lines.

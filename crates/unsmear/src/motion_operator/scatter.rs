@@ -2,7 +2,7 @@
 
 use super::group::TOGETHER;
 use super::lanes::{LANES, Lanes};
-use super::strands::Strand;
+use super::strands::{Strand, Tap};
 
 /// A row of products of a group, between blocks of zeros.
 #[derive(Debug, Clone, Copy)]
@@ -52,12 +52,13 @@ pub(super) fn write_products<const N: usize>(
 pub(super) fn add_strand<const MIRRORED: bool, const N: usize>(
     products: &[Products],
     strand: &Strand,
+    taps: &[Tap],
     x: &mut [f32],
     place: usize,
 ) {
     let mut sums = [Lanes::ZERO; TOGETHER + 1];
-    for tap in strand.taps() {
-        let shift = if MIRRORED { strand.range - tap.shift() } else { tap.shift() };
+    for tap in taps {
+        let shift = if MIRRORED { strand.range() - tap.shift() } else { tap.shift() };
         let from = &products[tap.row()].0.as_flattened()[LANES - shift..];
         let from = &from[..(N + 1) * LANES].as_chunks().0[..=N];
         for n in 0..=N {

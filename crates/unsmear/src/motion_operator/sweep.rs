@@ -91,11 +91,11 @@ pub(super) fn scatter_row(
         if let Some(records) = records.first_chunk::<TOGETHER>() {
             renew(taps, plan, group, records, &mut scratch.joint);
             let data = records.each_ref().map(|record| lanes_at(r, record));
-            scatter(records, &mut scratch.joint, &data, &mut scratch.products, x);
+            scatter(plan, group, records, &mut scratch.joint, &data, &mut scratch.products, x);
         } else if let Some(records) = records.first_chunk::<1>() {
             renew(taps, plan, group, records, &mut scratch.single);
             let data = records.each_ref().map(|record| lanes_at(r, record));
-            scatter(records, &mut scratch.single, &data, &mut scratch.products, x);
+            scatter(plan, group, records, &mut scratch.single, &data, &mut scratch.products, x);
         }
     }
 }
@@ -120,11 +120,11 @@ pub(super) fn normal_row(
         if let Some(records) = records.first_chunk::<TOGETHER>() {
             renew(taps, plan, group, records, &mut scratch.joint);
             let data = there_and_back(plan, records, &scratch.joint, x, weights, b);
-            scatter(records, &mut scratch.joint, &data, &mut scratch.products, out);
+            scatter(plan, group, records, &mut scratch.joint, &data, &mut scratch.products, out);
         } else if let Some(records) = records.first_chunk::<1>() {
             renew(taps, plan, group, records, &mut scratch.single);
             let data = there_and_back(plan, records, &scratch.single, x, weights, b);
-            scatter(records, &mut scratch.single, &data, &mut scratch.products, out);
+            scatter(plan, group, records, &mut scratch.single, &data, &mut scratch.products, out);
         }
     }
 }
@@ -261,6 +261,8 @@ fn add_product<const MIRRORED: bool>(
 /// Adds the weights of the records times their data to `x`.
 #[inline(always)]
 fn scatter<const N: usize>(
+    plan: &RowPlan,
+    group: &Group,
     records: &[Record; N],
     rows: &mut Expanded<N>,
     data: &[Lanes; N],
@@ -269,13 +271,16 @@ fn scatter<const N: usize>(
 ) {
     write_products(&rows.weights, data, products);
     let place = x.place(&records[0]);
-    for strand in rows.strands() {
-        let [dx, dy] = strand.place;
-        let delta = dy as isize * x.stride as isize + dx as isize;
-        add_strand::<false, N>(products, strand, x.samples, place.wrapping_add_signed(delta));
+    let (strands, own) = rows.strands(plan, group);
+    for strand in strands.of(own) {
+        let taps = strands.taps(strand);
+        let products = strand.rows_of(products);
+        let [dx, dy] = strand.place();
+        let delta = dy * x.stride as isize + dx;
+        add_strand::<false, N>(products, strand, taps, x.samples, place.wrapping_add_signed(delta));
         if records[0].kind == Kind::Straight {
-            let place = place.wrapping_add_signed(-delta - strand.range as isize);
-            add_strand::<true, N>(products, strand, x.samples, place);
+            let place = place.wrapping_add_signed(-delta - strand.range() as isize);
+            add_strand::<true, N>(products, strand, taps, x.samples, place);
         }
     }
 }

@@ -63,7 +63,7 @@ impl Walk {
         });
         let operators = looks
             .iter()
-            .map(|look| Ok(MotionOperator::new(&look.paths, self.taps, pad)?.for_many()))
+            .map(|look| MotionOperator::for_many(&look.paths, self.taps, pad))
             .collect::<Result<Vec<_>>>()?;
         let data = looks
             .iter()

@@ -121,17 +121,19 @@ fn what_is_kept_changes_no_byte() {
         _ => [0.5 + 0.025 * x, 0.3 * y],
     });
     let paths = MotionPaths::new(&motion, 1.0, None).unwrap();
-    let made = MotionOperator::new(&paths, Taps::Spline, paths.reach() + 2).unwrap();
-    let kept = made.clone().for_many();
-    let (rows, columns) = made.unknown_shape();
-    let (x, r) = (noise(rows * columns, 1), noise(shape.0 * shape.1, 2));
-    let all = |operator: &MotionOperator| {
-        let (mut b, mut c) = (vec![0.0; r.len()], vec![0.0; r.len()]);
-        let (mut back, mut out) = (vec![0.0; x.len()], vec![0.0; x.len()]);
-        operator.apply(&x, &mut b);
-        operator.adjoint(&r, &mut back);
-        operator.normal(&x, &r, &mut c, &mut out);
-        [b, back, c, out]
-    };
-    assert_eq!(all(&made), all(&kept));
+    for taps in [Taps::Spline, Taps::Cubic, Taps::Linear] {
+        let made = MotionOperator::new(&paths, taps, paths.reach() + 2).unwrap();
+        let kept = MotionOperator::for_many(&paths, taps, paths.reach() + 2).unwrap();
+        let (rows, columns) = made.unknown_shape();
+        let (x, r) = (noise(rows * columns, 1), noise(shape.0 * shape.1, 2));
+        let all = |operator: &MotionOperator| {
+            let (mut b, mut c) = (vec![0.0; r.len()], vec![0.0; r.len()]);
+            let (mut back, mut out) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+            operator.apply(&x, &mut b);
+            operator.adjoint(&r, &mut back);
+            operator.normal(&x, &r, &mut c, &mut out);
+            [b, back, c, out]
+        };
+        assert_eq!(all(&made), all(&kept));
+    }
 }
