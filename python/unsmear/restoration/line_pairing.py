@@ -20,8 +20,10 @@ Evenly spaced lines make it real, whatever the scene is and however it was blurr
 real parts give S and S' for each d, the imaginary parts d: least squares, weighted by
 their variance, <|E|^2>^2 less the square of the real part.
 
-The frame itself is not resampled. The restoration lives on even lines, its operator
-reads it where the recorded ones lie, and so is it shown: every sample where it was.
+The frame itself is not resampled. The restoration lives on evenly spaced lines, its
+operator reads it where the recorded ones lie, and so is it shown: every sample where it
+was. Fields of two moments of a picture that rises or sinks as a whole look the same,
+and are mended the same way.
 """
 
 from __future__ import annotations
