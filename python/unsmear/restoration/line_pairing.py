@@ -213,4 +213,5 @@ def as_recorded(picture: Planes, pad: int, offset: float) -> Planes:
     more = ((pad, pad), (pad, pad), (0, 0))
     read = [pulled(plane, np.pad(lines, more)) for plane in picture]
     there = cropped(np.stack(read), pad)
-    return np.where(np.isfinite(there), there, inner)
+    # What is unknown stays so.
+    return np.where(np.isfinite(there) & np.isfinite(inner), there, inner)
