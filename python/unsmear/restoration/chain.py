@@ -198,10 +198,9 @@ class Chain:
             return Restored(planes, nothing, float("nan"), report)
         strength = self._strength(index)
         single, pad, sharp = self._single(index, strength)
-        luma = self._source.luma(index)[np.newaxis]
+        luma = self._source.luma
         verdict = judge(
-            # To first order the inverse, as even as the restorations.
-            as_recorded(luma, 0, -self._lines.offset(index))[0],
+            luma(index),
             self._source.luma_of(cropped(single, pad)),
             self._twins(index),
             blur,

@@ -16,7 +16,6 @@ import numpy as np
 from unsmear import _unsmear
 from unsmear.restoration.clip_motion import ClipMotion
 from unsmear.restoration.joint import Neighbour
-from unsmear.restoration.line_pairing import line_offsets
 from unsmear.restoration.memo import Memo
 from unsmear.restoration.registration import settled
 from unsmear.restoration.sampling import composed, inside
@@ -109,7 +108,7 @@ class Neighbours:
             settled(self._walks.twin(other), self._walks.twin(index), way, seen),
             seen,
             self._walks.ceiling(other),
-            line_offsets(seen.shape, self._lines.offset(other)),
+            self._lines.field(other),
         )
 
     def forget_before(self, index: int) -> None:

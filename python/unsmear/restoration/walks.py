@@ -14,7 +14,6 @@ import numpy as np
 
 from unsmear import _unsmear
 from unsmear.restoration.clipping import brighter_than_white
-from unsmear.restoration.line_pairing import line_offsets
 from unsmear.restoration.looks import (
     LINES,
     SPLINE,
@@ -102,7 +101,7 @@ class Walks:
             motion.acceleration,
             exposure,
             visible,
-            line_offsets(visible.shape, self._lines.offset(index)),
+            self._lines.field(index),
             ceiling=ceiling,
             taps=taps,
         )
