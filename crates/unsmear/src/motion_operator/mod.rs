@@ -120,7 +120,9 @@ impl MotionOperator {
         let row = |y| {
             let own = y == 0 || !rows_agree(paths, y);
             let plan = own.then(|| RowPlan::new(paths, y, taps))?;
-            Some(if many { plan.with_strands(taps) } else { plan })
+            // A plan that serves several rows is used often anyway.
+            let shared = y + 1 < height && rows_agree(paths, y + 1);
+            Some(if many || shared { plan.with_strands(taps) } else { plan })
         };
         let own: Vec<Option<RowPlan>> = (0..height).into_par_iter().map(row).collect();
         let mut plans: Vec<Arc<RowPlan>> = Vec::with_capacity(height);
