@@ -53,7 +53,8 @@ __all__ = ["LinePairing", "Pairing", "as_recorded", "line_offsets", "measured"]
 
 LEAST_OFFSET, GREATEST_OFFSET = 0.1, 0.4
 """px. Photographs and films that were never interlaced measure 0 to .06 (35 looked at),
-enlarged ones more, but down and across alike."""
+enlarged ones more, but down and across alike. Lines shown twice measure .5, the most
+that is looked for."""
 LEAST_EXPLAINED = 0.8
 """Of the imaginary parts: .88 to .99 where lines are paired, seldom above .7 else."""
 GREATEST_DEVIATION = 0.3
@@ -63,11 +64,15 @@ BAND = (0.02, 0.24)
 """Cycles per line: slower waves hold the frame's edges, faster ones say nothing of d
 that noise would not."""
 LEAST_LINES = 32
+"""And columns. So many lines have seven frequencies in the band."""
 BLOCKS = 8
 """Of columns, of which one at a time is left out to find the deviation."""
 TURNS = 4
+"""Of the fit: the second changes an offset of .3 px by a hundredth, the fourth by
+a hundred-thousandth."""
 WINDOW = 2
-"""Frames on each side that are heard."""
+"""Frames on each side that are heard: frames of nasa differ by .03 px, five of them
+in the median by .01."""
 
 
 class Pairing(NamedTuple):

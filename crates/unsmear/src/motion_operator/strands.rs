@@ -93,7 +93,7 @@ impl Strands {
             (least, most) = (least.min(dy), most.max(dy));
         }
         self.last.clear();
-        self.last.resize((most - least + 1).max(0) as usize, NONE);
+        self.last.resize((most - least + 1) as usize, NONE);
         for (row, &[dx, dy]) in places.iter().enumerate() {
             let last = &mut self.last[(dy - least) as usize];
             if let Some(strand) = self.all.get_mut(*last as usize) {
